@@ -1,0 +1,49 @@
+// Encoding "float32": little-endian float32, `dimension` per vertex.
+#include <bit>
+#include <cstring>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/error.h"
+#include "core/frames/encoding.h"
+
+namespace deform {
+namespace {
+
+static_assert(std::endian::native == std::endian::little,
+              "frames are copied as they lie in memory");
+
+class Float32 final : public FrameEncoding {
+ public:
+  absl::string_view id() const override { return "float32"; }
+
+  int64_t VerticesPerChunk(int dimension) const override {
+    return kMaxChunkBytes / (dimension * int64_t{sizeof(float)});
+  }
+
+  int64_t Encode(std::span<const float> positions, int /*dimension*/,
+                 uint8_t* out) const override {
+    std::memcpy(out, positions.data(), positions.size_bytes());
+    return static_cast<int64_t>(positions.size_bytes());
+  }
+
+  absl::Status Decode(std::span<const uint8_t> bytes, int /*dimension*/,
+                      std::span<float> positions) const override {
+    if (bytes.size() != positions.size_bytes()) {
+      return InvalidInput("BAD_FRAME", "frame.data",
+                          absl::StrCat("chunk has ", bytes.size(),
+                                       " bytes, its vertices need ",
+                                       positions.size_bytes()));
+    }
+    std::memcpy(positions.data(), bytes.data(), bytes.size());
+    return absl::OkStatus();
+  }
+};
+
+}  // namespace
+
+const FrameEncoding& Float32Encoding() {
+  static const Float32 encoding;
+  return encoding;
+}
+
+}  // namespace deform

@@ -1,0 +1,53 @@
+// Weights as the deformation kernels read them: tiles of 16 points, all columns
+// of a tile behind each other, so that a tile is one forward walk.
+#pragma once
+
+#include <cstdint>
+#include <cstdlib>
+#include <memory>
+#include <span>
+
+namespace deform {
+
+inline constexpr int64_t kTilePoints = 16;
+
+// `points` x `columns` float weights, 64-byte aligned, zero where not set. The
+// last tile is padded with points of weight 0.
+class WeightTiles {
+ public:
+  WeightTiles() = default;
+  WeightTiles(int64_t points, int64_t columns);
+
+  int64_t points() const { return points_; }
+  int64_t columns() const { return columns_; }
+  int64_t tiles() const { return (points_ + kTilePoints - 1) / kTilePoints; }
+  int64_t bytes() const {
+    return tiles() * columns_ * kTilePoints * int64_t{sizeof(float)};
+  }
+
+  // columns x 16 floats.
+  const float* tile(int64_t t) const { return data_.get() + Offset(t); }
+  float* tile(int64_t t) { return data_.get() + Offset(t); }
+
+  float at(int64_t point, int64_t column) const {
+    return tile(point / kTilePoints)[column * kTilePoints +
+                                     point % kTilePoints];
+  }
+  // Different points of different tiles may be set from different threads.
+  void set(int64_t point, int64_t column, float value) {
+    tile(point / kTilePoints)[column * kTilePoints + point % kTilePoints] =
+        value;
+  }
+
+ private:
+  struct Free {
+    void operator()(float* data) const { std::free(data); }
+  };
+  int64_t Offset(int64_t t) const { return t * columns_ * kTilePoints; }
+
+  int64_t points_ = 0;
+  int64_t columns_ = 0;
+  std::unique_ptr<float[], Free> data_;
+};
+
+}  // namespace deform

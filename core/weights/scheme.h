@@ -1,0 +1,107 @@
+// The seam for coordinate schemes: how a point is expressed by a rig.
+//
+// With p the V rig vertices and n the F unit outward face normals at rest,
+//
+//   x = sum_k vertex(k) p_k + sum_j normal(j) n_j
+//
+// To add a scheme: write schemes/<name>.cc, then add one line to
+// builtin_schemes.cc. The property tests run over that list.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "core/mesh/rig.h"
+#include "core/mesh/types.h"
+
+namespace deform {
+
+enum class RigKind { kCage, kHandles };
+
+// What became of a point.
+enum class PointState : uint8_t {
+  kInside,
+  kBoundary,
+  // Outside, and this scheme reaches it only through an exit face; its rows are
+  // 0 until WeightEvaluator::Extend.
+  kOutside,
+  // Bound although outside: the scheme (mean value) needs no exit face.
+  kBoundOutside,
+  // Handles: no positive weights exist.
+  kOutsideHull,
+  // The solver did not converge; never a silent weight.
+  kNotConverged,
+  // Cage: it winds neither 0 nor 1 times around this point: parts of it overlap
+  // or are inverted.
+  kOverlap,
+};
+
+using RowMatrix =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// Weights of a block of points, in double: what an evaluator writes.
+struct WeightBlock {
+  RowMatrix vertex;  // n x V, no unit; every bound row sums to 1.
+  RowMatrix normal;  // n x F, model units; n x 0 if normals are not used.
+  std::vector<PointState> states;   // n
+  std::vector<uint16_t> iterations;  // n for iterative schemes, else empty.
+};
+
+// A scheme prepared for one rig. Has no state that changes: one object serves
+// every thread.
+class WeightEvaluator {
+ public:
+  virtual ~WeightEvaluator() = default;
+
+  // Computes the weights of `points` (n x 3, model units), which should be
+  // neighbours, into `block`, resized as needed. Points on a cage get the limit
+  // from inside. Rows of points that are not bound are 0. O(n (V + F)).
+  virtual void Evaluate(const PositionsRef& points,
+                        WeightBlock& block) const = 0;
+
+  // Adds to the rows of an outside point its extension through `exit_face`.
+  // Only for schemes that report kOutside.
+  virtual void Extend(const Vec3& /*point*/, int64_t /*exit_face*/,
+                      std::span<double> /*vertex*/,
+                      std::span<double> /*normal*/) const {}
+};
+
+struct SchemeOptions {
+  // T-CC: s_i >= 0, one per handle; empty means all 0.
+  std::vector<double> handle_weights;
+  // S-CC: > 1; 0 means 2. Accepted for those who have a value: it cancels out.
+  double lambda = 0;
+};
+
+// One way to express a point by a rig. Implementations have no state.
+class CoordinateScheme {
+ public:
+  virtual ~CoordinateScheme() = default;
+
+  // Name on the wire and in stored bindings; it never changes meaning.
+  virtual absl::string_view id() const = 0;
+  // One line for people.
+  virtual absl::string_view description() const = 0;
+  virtual RigKind rig_kind() const = 0;
+  // Whether face normals have weights. A rest pose's normals are n, a posed
+  // face's s n' with the stretch s of [L08] Eq. 13 and 14.
+  virtual bool uses_normals() const = 0;
+
+  // Prepares what depends on the rig alone. The evaluator keeps a copy of what
+  // it needs. Returns InvalidArgument (WRONG_RIG, INVALID_OPTION) if the rig is
+  // of the other kind or the options are out of range.
+  virtual absl::StatusOr<std::unique_ptr<const WeightEvaluator>> Prepare(
+      const Rig& rig, const SchemeOptions& options) const = 0;
+};
+
+// All schemes, in the order of builtin_schemes.cc.
+std::span<const CoordinateScheme* const> AllSchemes();
+
+// NotFound (UNKNOWN_SCHEME) that lists the known ones.
+absl::StatusOr<const CoordinateScheme*> FindScheme(absl::string_view id);
+
+}  // namespace deform

@@ -19,18 +19,18 @@ constexpr char kPayload[] = "deformd/error-detail";
 absl::Status MakeError(absl::StatusCode code, absl::string_view message,
                        const ErrorDetail& detail) {
   absl::Status status(code, message);
-  status.SetPayload(
-      kPayload, absl::Cord(absl::StrJoin(
-                    {detail.reason, detail.field, detail.resource_type,
-                     detail.resource_name},
-                    std::string(1, kSeparator))));
+  status.SetPayload(kPayload, absl::Cord(absl::StrJoin(
+                                  {detail.reason, detail.field,
+                                   detail.resource_type, detail.resource_name},
+                                  std::string(1, kSeparator))));
   return status;
 }
 
 absl::Status InvalidInput(absl::string_view reason, absl::string_view field,
                           absl::string_view message) {
-  return MakeError(absl::StatusCode::kInvalidArgument, message,
-                   {.reason = std::string(reason), .field = std::string(field)});
+  return MakeError(
+      absl::StatusCode::kInvalidArgument, message,
+      {.reason = std::string(reason), .field = std::string(field)});
 }
 
 ErrorDetail DetailOf(const absl::Status& status) {
@@ -44,12 +44,10 @@ ErrorDetail DetailOf(const absl::Status& status) {
 
 absl::Status Annotate(const absl::Status& status, absl::string_view prefix) {
   if (status.ok()) return status;
-  absl::Status annotated(status.code(),
-                         absl::StrCat(prefix, status.message()));
-  status.ForEachPayload(
-      [&](absl::string_view url, const absl::Cord& payload) {
-        annotated.SetPayload(url, payload);
-      });
+  absl::Status annotated(status.code(), absl::StrCat(prefix, status.message()));
+  status.ForEachPayload([&](absl::string_view url, const absl::Cord& payload) {
+    annotated.SetPayload(url, payload);
+  });
   return annotated;
 }
 

@@ -9,15 +9,14 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
-#define DEFORM_RETURN_IF_ERROR(expression)                      \
-  do {                                                          \
-    if (absl::Status deform_status = (expression);              \
-        !deform_status.ok()) {                                  \
-      return deform_status;                                     \
-    }                                                           \
+#define DEFORM_RETURN_IF_ERROR(expression)                                \
+  do {                                                                    \
+    if (absl::Status deform_status = (expression); !deform_status.ok()) { \
+      return deform_status;                                               \
+    }                                                                     \
   } while (false)
 
-#define DEFORM_ASSIGN_OR_RETURN(declaration, expression)        \
+#define DEFORM_ASSIGN_OR_RETURN(declaration, expression)              \
   DEFORM_ASSIGN_OR_RETURN_AS(DEFORM_CONCAT(deform_result_, __LINE__), \
                              declaration, expression)
 

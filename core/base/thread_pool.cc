@@ -65,7 +65,8 @@ ThreadPool::ThreadPool(const Options& options) {
                         : std::max(1u, std::thread::hardware_concurrency());
   for (int i = 0; i < count; ++i) {
     threads_.emplace_back([this, niceness = options.niceness] {
-      // On Linux a thread's nice value is its own; failing to yield is no error.
+      // On Linux a thread's nice value is its own; failing to yield is no
+      // error.
       if (niceness > 0) setpriority(PRIO_PROCESS, gettid(), niceness);
       Work();
     });

@@ -2,17 +2,19 @@
 //
 //   x = T eta + sum phi (v' - T v) + sum psi (s n' - A n)
 //
-// with T = (A, t) the similarity that fits the pose best (handles: the affine
-// map), applied in double. So the rest pose and rigid motion are exact, and
-// float errors scale with the deformation that is left. Source: [L08] Eq. 9 in
-// displacement form, which is exact because the weights reproduce eta.
+// with T = (A, t) the similarity that fits the pose best, applied in double. So
+// the rest pose and rigid motion are exact, and float errors scale with the
+// deformation that is left. Source: [L08] Eq. 9 in displacement form, exact
+// because the weights reproduce eta and their vertex part sums to 1.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "core/base/thread_pool.h"
+#include "core/deform/affine_map.h"
 #include "core/deform/columns.h"
 #include "core/deform/pose.h"
 #include "core/weights/binding.h"
@@ -25,21 +27,22 @@ struct DeformReport {
   int64_t columns_applied = 0;
   bool full = false;
   // How far crossed faces deviate from the similarity of their exit face; see
-  // ExitMismatch() in columns.h.
+  // ExitMismatch().
   double exit_mismatch = 0;
 };
 
 // Not thread-safe: one session, one Deformer.
 class Deformer {
  public:
+  // kAutomatic applies only the columns that changed since the last call where
+  // that is cheaper. Their sums are kept in double, and a full pass is made now
+  // and then, so both paths agree to 1e-6 D however many steps were taken.
   enum class Path { kAutomatic, kFull };
 
   // Starts at the rest pose. `pool` may be null; borrowed.
   Deformer(std::shared_ptr<const Binding> binding, ThreadPool* pool);
 
-  // Moves to `pose`, which is right (CheckPoseUpdate). With kAutomatic only the
-  // columns that changed since the last call are applied where that is cheaper;
-  // a full pass is made before float drift can exceed 2.5e-7 D.
+  // Moves to `pose`, which is right (CheckPoseUpdate).
   DeformReport MoveTo(const Pose& pose, Path path = Path::kAutomatic);
 
   const Binding& binding() const { return *binding_; }
@@ -54,22 +57,28 @@ class Deformer {
                     float* out) const;
 
  private:
-  void FitFrame();
+  // The rows of `pose` that differ from the current one; all if the stretch
+  // blend does.
+  std::vector<int32_t> MovedVertices(const Pose& pose) const;
+  bool PrefersFull(const std::vector<int32_t>& changed,
+                   const Columns& next) const;
   void ApplyAll();
-  void ApplyChanged(const std::vector<int32_t>& changed);
+  void ApplyChanged(const std::vector<int32_t>& changed, const Columns& next);
+  void ForEachTile(absl::FunctionRef<void(int64_t)> body);
   Vec3 PointAt(int64_t point) const;
-  void ForTiles(absl::FunctionRef<void(int64_t)> body);
 
   const std::shared_ptr<const Binding> binding_;
   ThreadPool* const pool_;
   const PosedColumns posed_columns_;
-  std::vector<char> fixed_;  // N; empty if no point is fixed.
+  std::vector<char> fixed_;  // N, or empty if no point stays at rest.
 
   Pose pose_;
-  AffineMap frame_;      // T, as of the last full pass.
-  RowMatrix columns_;    // C x 3, posed columns, model units.
-  std::vector<float> displacement_;  // tiles x 3 x 16
-  double drift_ = 0;     // Bound on the float error gathered, model units.
+  Columns columns_;  // Of pose_.
+  AffineMap map_;    // T, as of the last full pass.
+  // What the residual columns may grow to until T is fitted anew.
+  double residual_limit_ = 0;
+  int steps_since_full_ = 0;
+  std::vector<double> displacement_;  // tiles x 3 x 16, the two sums above.
 };
 
 }  // namespace deform

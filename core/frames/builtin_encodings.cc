@@ -2,8 +2,7 @@
 
 // To add an encoding: write encodings/<name>.cc with a function
 // <Name>Encoding(), then add one line here.
-#define DEFORM_ENCODINGS(X) \
-  X(Float32)
+#define DEFORM_ENCODINGS(X) X(Float32)
 
 namespace deform {
 

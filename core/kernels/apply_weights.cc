@@ -7,12 +7,13 @@ constexpr int kLanes = kTilePoints;
 
 // Three accumulators of one tile; fixed lengths let the compiler keep them in
 // registers.
+template <typename Real>
 struct Sums {
-  float x[kLanes] = {};
-  float y[kLanes] = {};
-  float z[kLanes] = {};
+  Real x[kLanes] = {};
+  Real y[kLanes] = {};
+  Real z[kLanes] = {};
 
-  void Add(const float* weights, const float* column) {
+  void Add(const float* weights, const Real* column) {
     for (int i = 0; i < kLanes; ++i) x[i] += weights[i] * column[0];
     for (int i = 0; i < kLanes; ++i) y[i] += weights[i] * column[1];
     for (int i = 0; i < kLanes; ++i) z[i] += weights[i] * column[2];
@@ -23,7 +24,7 @@ struct Sums {
 
 void ApplyTile(const float* tile, int64_t columns, const float* column,
                float* out) {
-  Sums sums;
+  Sums<float> sums;
   for (int64_t c = 0; c < columns; ++c) {
     sums.Add(tile + c * kLanes, column + c * 3);
   }
@@ -35,8 +36,8 @@ void ApplyTile(const float* tile, int64_t columns, const float* column,
 }
 
 void AddTileColumns(const float* tile, const int32_t* index, int64_t count,
-                    const float* delta, float* out) {
-  Sums sums;
+                    const double* delta, double* out) {
+  Sums<double> sums;
   for (int64_t k = 0; k < count; ++k) {
     sums.Add(tile + int64_t{index[k]} * kLanes, delta + k * 3);
   }

@@ -14,10 +14,12 @@ namespace deform {
 void ApplyTile(const float* tile, int64_t columns, const float* column,
                float* out);
 
-// The same for some columns only, added: out += sum over k of
-// tile[index[k] * 16 + i] * delta[k * 3 + d].
+// The same for some columns only, in double, added:
+// out[d * 16 + i] += sum over k of tile[index[k] * 16 + i] * delta[k * 3 + d].
+// Double, because these sums are kept over many steps; few columns are bound by
+// memory, not arithmetic.
 void AddTileColumns(const float* tile, const int32_t* index, int64_t count,
-                    const float* delta, float* out);
+                    const double* delta, double* out);
 
 // The judge: ApplyTile in double, one point at a time.
 void ApplyTilePlain(const float* tile, int64_t columns, const double* column,

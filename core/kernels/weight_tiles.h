@@ -30,8 +30,8 @@ class WeightTiles {
   float* tile(int64_t t) { return data_.get() + Offset(t); }
 
   float at(int64_t point, int64_t column) const {
-    return tile(point / kTilePoints)[column * kTilePoints +
-                                     point % kTilePoints];
+    return tile(point /
+                kTilePoints)[column * kTilePoints + point % kTilePoints];
   }
   // Different points of different tiles may be set from different threads.
   void set(int64_t point, int64_t column, float value) {

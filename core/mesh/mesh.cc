@@ -19,9 +19,9 @@ absl::Status CheckPositions(const PositionsRef& positions,
                             absl::string_view what, absl::string_view field) {
   for (int64_t i = 0; i < positions.rows(); ++i) {
     if (!positions.row(i).allFinite()) {
-      return InvalidInput("NON_FINITE", field,
-                          absl::StrCat(what, " ", i,
-                                       " has a coordinate that is not finite"));
+      return InvalidInput(
+          "NON_FINITE", field,
+          absl::StrCat(what, " ", i, " has a coordinate that is not finite"));
     }
     if (positions.row(i).cwiseAbs().maxCoeff() > kMaxCoordinate) {
       return InvalidInput(

@@ -1,7 +1,7 @@
 // Which exit face each outside point of a model belongs to ([L08] section 4.2).
 //
-// The exterior of a cage is cut into parts with one exit face each; what must be
-// smooth is the map on the model. So for a mesh a connected component of its
+// The exterior of a cage is cut into parts with one exit face each; what must
+// be smooth is the map on the model. So for a mesh a connected component of its
 // outside part belongs, as a whole, to the face through which it leaves the
 // cage; a point set has no connectivity and takes the nearest face.
 #pragma once
@@ -20,8 +20,8 @@ namespace deform {
 struct ExitRegions {
   enum class Kind { kNone, kAutomatic, kFaces, kPerPoint };
   Kind kind = Kind::kNone;
-  std::vector<int32_t> faces;           // kFaces: the allowed ones.
-  std::vector<int32_t> face_of_point;   // kPerPoint: N entries, -1 for none.
+  std::vector<int32_t> faces;          // kFaces: the allowed ones.
+  std::vector<int32_t> face_of_point;  // kPerPoint: N entries, -1 for none.
 };
 
 // A connected part of the model outside the cage, with its exit face.
@@ -35,8 +35,9 @@ struct ExitPart {
 
 // Outside points that no exit face serves.
 struct UnboundPoints {
-  std::string reason;  // EXTERIOR_NO_EXIT_FACE, EXIT_AMBIGUOUS, OUTSIDE_HULL, ...
-  std::string detail;  // For people: "crosses faces 3 and 7".
+  std::string
+      reason;  // EXTERIOR_NO_EXIT_FACE, EXIT_AMBIGUOUS, OUTSIDE_HULL, ...
+  std::string detail;           // For people: "crosses faces 3 and 7".
   std::vector<int64_t> points;  // Sorted.
 };
 

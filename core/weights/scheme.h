@@ -47,7 +47,7 @@ using RowMatrix =
 struct WeightBlock {
   RowMatrix vertex;  // n x V, no unit; every bound row sums to 1.
   RowMatrix normal;  // n x F, model units; n x 0 if normals are not used.
-  std::vector<PointState> states;   // n
+  std::vector<PointState> states;    // n
   std::vector<uint16_t> iterations;  // n for iterative schemes, else empty.
 };
 

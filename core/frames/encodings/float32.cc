@@ -29,10 +29,10 @@ class Float32 final : public FrameEncoding {
   absl::Status Decode(std::span<const uint8_t> bytes, int /*dimension*/,
                       std::span<float> positions) const override {
     if (bytes.size() != positions.size_bytes()) {
-      return InvalidInput("BAD_FRAME", "frame.data",
-                          absl::StrCat("chunk has ", bytes.size(),
-                                       " bytes, its vertices need ",
-                                       positions.size_bytes()));
+      return InvalidInput(
+          "BAD_FRAME", "frame.data",
+          absl::StrCat("chunk has ", bytes.size(), " bytes, its vertices need ",
+                       positions.size_bytes()));
     }
     std::memcpy(positions.data(), bytes.data(), bytes.size());
     return absl::OkStatus();

@@ -12,8 +12,8 @@ TEST(ThreadPool, CallsTheBodyOncePerIndex) {
   ThreadPool pool({.threads = 3});
   for (int64_t count : {0, 1, 2, 1000}) {
     std::vector<std::atomic<int>> calls(count);
-    EXPECT_TRUE(pool.ParallelFor(count, nullptr,
-                                 [&](int64_t i) { ++calls[i]; }));
+    EXPECT_TRUE(
+        pool.ParallelFor(count, nullptr, [&](int64_t i) { ++calls[i]; }));
     for (const auto& c : calls) EXPECT_EQ(c, 1);
   }
 }

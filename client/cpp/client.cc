@@ -1,0 +1,330 @@
+#include "client/cpp/client.h"
+
+#include <grpcpp/create_channel.h>
+#include <zlib.h>
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "client/cpp/convert.h"
+#include "client/cpp/deform_stream_impl.h"
+#include "client/cpp/status.h"
+#include "core/base/error.h"
+#include "core/base/status_macros.h"
+#include "deform/v1/binding.grpc.pb.h"
+#include "deform/v1/model.grpc.pb.h"
+#include "deform/v1/session.grpc.pb.h"
+
+namespace deform {
+namespace {
+
+constexpr int64_t kUploadChunkBytes = int64_t{1} << 20;
+
+std::string ToString(absl::string_view text) {
+  return std::string(text.data(), text.size());
+}
+
+// Frames are large and few: wide windows and HTTP/2 frames, no probing of the
+// connection's speed. Connections come back fast and are watched with pings.
+grpc::ChannelArguments ChannelArguments() {
+  grpc::ChannelArguments arguments;
+  arguments.SetInt("grpc.http2.lookahead_bytes", 16 << 20);
+  arguments.SetInt("grpc.http2.max_frame_size", (1 << 24) - 1);
+  arguments.SetInt("grpc.http2.bdp_probe", 0);
+  arguments.SetInt("grpc.http2.max_pings_without_data", 0);
+  arguments.SetInt("grpc.keepalive_time_ms", 20000);
+  arguments.SetInt("grpc.initial_reconnect_backoff_ms", 50);
+  arguments.SetInt("grpc.min_reconnect_backoff_ms", 50);
+  arguments.SetInt("grpc.max_reconnect_backoff_ms", 500);
+  // What a server answers was asked for, however long its lists are.
+  arguments.SetMaxReceiveMessageSize(-1);
+  return arguments;
+}
+
+}  // namespace
+
+struct Client::Impl {
+  Impl(std::shared_ptr<grpc::Channel> shared, const ClientOptions& chosen)
+      : channel(std::move(shared)),
+        options(chosen),
+        models(v1::ModelService::NewStub(channel)),
+        bindings(v1::BindingService::NewStub(channel)),
+        sessions(v1::SessionService::NewStub(channel)) {}
+
+  // A call without work behind it.
+  template <typename Stub, typename Method, typename Request, typename Response>
+  absl::Status Call(Stub& stub, Method method, const Request& request,
+                    Response* response) {
+    grpc::ClientContext context;
+    context.set_wait_for_ready(true);
+    context.set_deadline(std::chrono::system_clock::now() +
+                         options.call_timeout);
+    return FromGrpc((stub.*method)(&context, request, response));
+  }
+
+  // All pages of a list; `read` takes one.
+  template <typename Response, typename Stub, typename Method, typename Request,
+            typename Read>
+  absl::Status CallPages(Stub& stub, Method method, Request request,
+                         Read read) {
+    request.set_tenant(options.tenant);
+    do {
+      Response response;
+      DEFORM_RETURN_IF_ERROR(Call(stub, method, request, &response));
+      read(response);
+      request.set_page_token(response.next_page_token());
+    } while (!request.page_token().empty());
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<v1::GetBindingResponse> GetBinding(
+      absl::string_view binding_id, bool with_rig) {
+    v1::GetBindingRequest request;
+    request.set_tenant(options.tenant);
+    request.set_binding_id(ToString(binding_id));
+    request.set_with_rig(with_rig);
+    v1::GetBindingResponse response;
+    DEFORM_RETURN_IF_ERROR(Call(
+        *bindings, &v1::BindingService::Stub::GetBinding, request, &response));
+    return response;
+  }
+
+  const std::shared_ptr<grpc::Channel> channel;
+  const ClientOptions options;
+  const std::unique_ptr<v1::ModelService::Stub> models;
+  const std::unique_ptr<v1::BindingService::Stub> bindings;
+  const std::unique_ptr<v1::SessionService::Stub> sessions;
+};
+
+absl::StatusOr<Client> Client::Connect(absl::string_view target,
+                                       const ClientOptions& options) {
+  const std::shared_ptr<grpc::Channel> channel = grpc::CreateCustomChannel(
+      ToString(target), grpc::InsecureChannelCredentials(), ChannelArguments());
+  if (!channel->WaitForConnected(std::chrono::system_clock::now() +
+                                 options.connect_timeout)) {
+    return MakeError(absl::StatusCode::kUnavailable,
+                     absl::StrCat("no server answers at ", target),
+                     {.reason = "SERVER_UNREACHABLE"});
+  }
+  return Client(std::make_shared<Impl>(channel, options));
+}
+
+absl::StatusOr<ModelInfo> Client::RegisterModel(
+    const ModelArrays& model, absl::string_view display_name,
+    const ProgressCallback& progress) {
+  const ModelBytes bytes(model);
+  grpc::ClientContext context;
+  v1::RegisterModelResponse response;
+  const auto call = impl_->models->RegisterModel(&context, &response);
+  v1::RegisterModelRequest request;
+  v1::ModelHeader& header = *request.mutable_header();
+  header.set_tenant(impl_->options.tenant);
+  header.set_display_name(ToString(display_name));
+  header.set_dimension(static_cast<uint32_t>(model.dimension));
+  header.set_vertex_count(model.positions.rows());
+  header.set_face_count(model.faces.rows());
+  bool open = call->Write(request);
+  for (int64_t offset = 0; open && offset < bytes.size();) {
+    const int64_t count = std::min(kUploadChunkBytes, bytes.size() - offset);
+    v1::ModelChunk& chunk = *request.mutable_chunk();
+    chunk.set_offset(offset);
+    chunk.set_data(bytes.Range(offset, count));
+    chunk.set_crc32(static_cast<uint32_t>(
+        crc32(0, reinterpret_cast<const Bytef*>(chunk.data().data()),
+              static_cast<uInt>(count))));
+    open = call->Write(request);
+    offset += count;
+    if (open && progress) progress(offset, bytes.size());
+  }
+  if (open) call->WritesDone();
+  DEFORM_RETURN_IF_ERROR(FromGrpc(call->Finish()));
+  ModelInfo info = FromProto(response.model());
+  info.existed = response.existed();
+  return info;
+}
+
+absl::StatusOr<ModelInfo> Client::GetModel(absl::string_view model_id) {
+  v1::GetModelRequest request;
+  request.set_tenant(impl_->options.tenant);
+  request.set_model_id(ToString(model_id));
+  v1::GetModelResponse response;
+  DEFORM_RETURN_IF_ERROR(impl_->Call(
+      *impl_->models, &v1::ModelService::Stub::GetModel, request, &response));
+  return FromProto(response.model());
+}
+
+absl::StatusOr<std::vector<ModelInfo>> Client::ListModels() {
+  std::vector<ModelInfo> models;
+  DEFORM_RETURN_IF_ERROR(impl_->CallPages<v1::ListModelsResponse>(
+      *impl_->models, &v1::ModelService::Stub::ListModels,
+      v1::ListModelsRequest(), [&](const v1::ListModelsResponse& page) {
+        for (const v1::Model& model : page.models()) {
+          models.push_back(FromProto(model));
+        }
+      }));
+  return models;
+}
+
+absl::Status Client::DeleteModel(absl::string_view model_id) {
+  v1::DeleteModelRequest request;
+  request.set_tenant(impl_->options.tenant);
+  request.set_model_id(ToString(model_id));
+  v1::DeleteModelResponse response;
+  return impl_->Call(*impl_->models, &v1::ModelService::Stub::DeleteModel,
+                     request, &response);
+}
+
+absl::StatusOr<BindingInfo> Client::CreateBinding(
+    const BindingSpec& spec, const ProgressCallback& progress) {
+  const v1::CreateBindingRequest request = ToProto(spec, impl_->options.tenant);
+  grpc::ClientContext context;
+  const auto call = impl_->bindings->CreateBinding(&context, request);
+  v1::CreateBindingResponse response;
+  std::optional<BindingInfo> info;
+  while (call->Read(&response)) {
+    if (response.has_binding()) {
+      info = FromProto(response.binding());
+    } else if (response.has_progress() && progress) {
+      progress(static_cast<int64_t>(response.progress().points_done()),
+               static_cast<int64_t>(response.progress().points_total()));
+    }
+  }
+  DEFORM_RETURN_IF_ERROR(FromGrpc(call->Finish()));
+  if (!info) return absl::InternalError("the server ended without a binding");
+  return *std::move(info);
+}
+
+absl::StatusOr<BindingInfo> Client::GetBinding(absl::string_view binding_id) {
+  DEFORM_ASSIGN_OR_RETURN(const v1::GetBindingResponse response,
+                          impl_->GetBinding(binding_id, false));
+  return FromProto(response.binding());
+}
+
+absl::StatusOr<RigArrays> Client::GetRig(absl::string_view binding_id) {
+  DEFORM_ASSIGN_OR_RETURN(const v1::GetBindingResponse response,
+                          impl_->GetBinding(binding_id, true));
+  return FromProto(response.rig());
+}
+
+absl::StatusOr<std::vector<BindingInfo>> Client::ListBindings(
+    absl::string_view model_id) {
+  std::vector<BindingInfo> bindings;
+  v1::ListBindingsRequest request;
+  request.set_model_id(ToString(model_id));
+  DEFORM_RETURN_IF_ERROR(impl_->CallPages<v1::ListBindingsResponse>(
+      *impl_->bindings, &v1::BindingService::Stub::ListBindings, request,
+      [&](const v1::ListBindingsResponse& page) {
+        for (const v1::Binding& binding : page.bindings()) {
+          bindings.push_back(FromProto(binding));
+        }
+      }));
+  return bindings;
+}
+
+absl::Status Client::DeleteBinding(absl::string_view binding_id) {
+  v1::DeleteBindingRequest request;
+  request.set_tenant(impl_->options.tenant);
+  request.set_binding_id(ToString(binding_id));
+  v1::DeleteBindingResponse response;
+  return impl_->Call(*impl_->bindings, &v1::BindingService::Stub::DeleteBinding,
+                     request, &response);
+}
+
+absl::Status Client::GetWeights(
+    absl::string_view binding_id, WeightPrecision precision, int64_t first,
+    int64_t count, absl::FunctionRef<absl::Status(const WeightRows&)> rows) {
+  v1::GetWeightsRequest request;
+  request.set_tenant(impl_->options.tenant);
+  request.set_binding_id(ToString(binding_id));
+  request.set_precision(precision == WeightPrecision::kRecomputedFloat64
+                            ? v1::WEIGHT_PRECISION_RECOMPUTED_FLOAT64
+                            : v1::WEIGHT_PRECISION_CACHED_FLOAT32);
+  request.set_first_point(first);
+  request.set_point_count(count);
+  grpc::ClientContext context;
+  const auto call = impl_->bindings->GetWeights(&context, request);
+  v1::GetWeightsResponse response;
+  absl::Status status;
+  while (call->Read(&response)) {
+    if (!status.ok()) continue;  // The cancelled call is read to its end.
+    const absl::StatusOr<WeightRows> part = FromProto(response);
+    status = part.ok() ? rows(*part) : part.status();
+    if (!status.ok()) context.TryCancel();
+  }
+  const absl::Status end = FromGrpc(call->Finish());
+  return status.ok() ? end : status;
+}
+
+absl::StatusOr<std::vector<SchemeInfo>> Client::ListSchemes() {
+  v1::ListSchemesResponse response;
+  DEFORM_RETURN_IF_ERROR(impl_->Call(*impl_->bindings,
+                                     &v1::BindingService::Stub::ListSchemes,
+                                     v1::ListSchemesRequest(), &response));
+  std::vector<SchemeInfo> schemes;
+  for (const v1::Scheme& scheme : response.schemes()) {
+    schemes.push_back(FromProto(scheme));
+  }
+  return schemes;
+}
+
+absl::StatusOr<SessionInfo> Client::CreateSession(
+    absl::string_view binding_id, absl::string_view session_id) {
+  v1::CreateSessionRequest request;
+  request.set_tenant(impl_->options.tenant);
+  request.set_binding_id(ToString(binding_id));
+  request.set_session_id(ToString(session_id));
+  v1::CreateSessionResponse response;
+  DEFORM_RETURN_IF_ERROR(impl_->Call(*impl_->sessions,
+                                     &v1::SessionService::Stub::CreateSession,
+                                     request, &response));
+  return FromProto(response.session());
+}
+
+absl::StatusOr<SessionInfo> Client::GetSession(absl::string_view session_id) {
+  v1::GetSessionRequest request;
+  request.set_tenant(impl_->options.tenant);
+  request.set_session_id(ToString(session_id));
+  v1::GetSessionResponse response;
+  DEFORM_RETURN_IF_ERROR(impl_->Call(*impl_->sessions,
+                                     &v1::SessionService::Stub::GetSession,
+                                     request, &response));
+  return FromProto(response.session());
+}
+
+absl::StatusOr<std::vector<SessionInfo>> Client::ListSessions() {
+  std::vector<SessionInfo> sessions;
+  DEFORM_RETURN_IF_ERROR(impl_->CallPages<v1::ListSessionsResponse>(
+      *impl_->sessions, &v1::SessionService::Stub::ListSessions,
+      v1::ListSessionsRequest(), [&](const v1::ListSessionsResponse& page) {
+        for (const v1::Session& session : page.sessions()) {
+          sessions.push_back(FromProto(session));
+        }
+      }));
+  return sessions;
+}
+
+absl::Status Client::DeleteSession(absl::string_view session_id) {
+  v1::DeleteSessionRequest request;
+  request.set_tenant(impl_->options.tenant);
+  request.set_session_id(ToString(session_id));
+  v1::DeleteSessionResponse response;
+  return impl_->Call(*impl_->sessions, &v1::SessionService::Stub::DeleteSession,
+                     request, &response);
+}
+
+absl::StatusOr<DeformStream> Client::Deform(absl::string_view session_id,
+                                            Delivery delivery) {
+  auto stream = std::make_unique<DeformStream::Impl>(*impl_->sessions);
+  v1::Join join;
+  join.set_tenant(impl_->options.tenant);
+  join.set_session_id(ToString(session_id));
+  join.set_delivery(delivery == Delivery::kEvery ? v1::DELIVERY_EVERY
+                                                 : v1::DELIVERY_LATEST);
+  for (const FrameEncoding* encoding : AllEncodings()) {
+    join.add_encodings(ToString(encoding->id()));
+  }
+  DEFORM_RETURN_IF_ERROR(stream->Join(join));
+  return DeformStream(std::move(stream));
+}
+
+}  // namespace deform

@@ -1,0 +1,117 @@
+// A deformd server, as seen from a program.
+//
+//   auto client = deform::Client::Connect("127.0.0.1:7777").value();
+//   auto model = client.RegisterModel(mesh, "bunny").value();
+//   auto binding = client.CreateBinding({.model_id = model.model_id,
+//                                        .rig = cage}).value();
+//   auto session = client.CreateSession(binding.binding_id).value();
+//   auto stream = client.Deform(session.session_id).value();
+//   stream.Send({.positions = posed_cage_vertices}).value();
+//   deform::Frame frame;
+//   while (stream.NextFrame(frame).ok()) Draw(frame.DoublePositions());
+//
+// Errors are the server's: code and message, and in DetailOf(status)
+// (core/base/error.h) the stable reason, the field to mend, the resource. A
+// server that cannot be reached is Unavailable with the reason
+// SERVER_UNREACHABLE.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "client/cpp/arrays.h"
+#include "client/cpp/deform_stream.h"
+#include "client/cpp/info.h"
+
+namespace deform {
+
+struct ClientOptions {
+  // Separates the data of those who share a server; empty means "default".
+  std::string tenant;
+  // How long Connect() waits for the server.
+  std::chrono::milliseconds connect_timeout{5000};
+  // How long a call without work behind it may take (all but RegisterModel,
+  // CreateBinding, GetWeights and Deform, which take as long as they need).
+  std::chrono::milliseconds call_timeout{30000};
+};
+
+enum class WeightPrecision {
+  kCachedFloat32,      // What deforming uses.
+  kRecomputedFloat64,  // Computed again from the rig.
+};
+
+// Weights of the consecutive points from `first_point` on.
+struct WeightRows {
+  int64_t first_point = 0;
+  RowMatrix vertex;  // rows x V; rows of unbound points are 0.
+  RowMatrix normal;  // rows x normal_count, model units.
+};
+
+// Done and total: bytes of an upload, points of a binding. Called on the
+// calling thread.
+using ProgressCallback = std::function<void(int64_t done, int64_t total)>;
+
+// Thread-safe: one client serves all threads. Cheap to copy; copies share a
+// connection, which comes back by itself when the server does.
+class Client {
+ public:
+  // `target` is HOST:PORT or unix:PATH. The connection is not encrypted: for
+  // loopback, Unix sockets and trusted networks.
+  static absl::StatusOr<Client> Connect(absl::string_view target,
+                                        const ClientOptions& options = {});
+
+  // Uploads `model` in chunks of at most 1 MiB. Vertex order is kept for ever.
+  // Registering the same arrays again finds the model that is there.
+  absl::StatusOr<ModelInfo> RegisterModel(
+      const ModelArrays& model, absl::string_view display_name,
+      const ProgressCallback& progress = {});
+  absl::StatusOr<ModelInfo> GetModel(absl::string_view model_id);
+  absl::StatusOr<std::vector<ModelInfo>> ListModels();
+  absl::Status DeleteModel(absl::string_view model_id);
+
+  // Returns when the weights are computed, or at once if they are there.
+  absl::StatusOr<BindingInfo> CreateBinding(
+      const BindingSpec& spec, const ProgressCallback& progress = {});
+  absl::StatusOr<BindingInfo> GetBinding(absl::string_view binding_id);
+  // The rig of a binding at rest.
+  absl::StatusOr<RigArrays> GetRig(absl::string_view binding_id);
+  // Of one model, or of all if `model_id` is empty.
+  absl::StatusOr<std::vector<BindingInfo>> ListBindings(
+      absl::string_view model_id = "");
+  absl::Status DeleteBinding(absl::string_view binding_id);
+
+  // Passes the weights of `count` points from `first` on (0: up to the last),
+  // in order, to `rows`. An error that `rows` returns ends the call with it.
+  absl::Status GetWeights(
+      absl::string_view binding_id, WeightPrecision precision, int64_t first,
+      int64_t count, absl::FunctionRef<absl::Status(const WeightRows&)> rows);
+
+  absl::StatusOr<std::vector<SchemeInfo>> ListSchemes();
+
+  // `session_id`: 1 to 64 of [A-Za-z0-9_-], or empty for one of the server's.
+  absl::StatusOr<SessionInfo> CreateSession(absl::string_view binding_id,
+                                            absl::string_view session_id = "");
+  absl::StatusOr<SessionInfo> GetSession(absl::string_view session_id);
+  absl::StatusOr<std::vector<SessionInfo>> ListSessions();
+  absl::Status DeleteSession(absl::string_view session_id);
+
+  // Joins a session: poses in, frames out.
+  absl::StatusOr<DeformStream> Deform(absl::string_view session_id,
+                                      Delivery delivery = Delivery::kLatest);
+
+ private:
+  struct Impl;
+  explicit Client(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+  std::shared_ptr<Impl> impl_;
+};
+
+}  // namespace deform

@@ -1,0 +1,42 @@
+// Between the values of this library and the messages of deform/v1.
+#pragma once
+
+#include "client/cpp/arrays.h"
+#include "client/cpp/client.h"
+#include "client/cpp/info.h"
+#include "core/deform/pose.h"
+#include "deform/v1/binding.pb.h"
+#include "deform/v1/model.pb.h"
+#include "deform/v1/session.pb.h"
+
+namespace deform {
+
+ModelInfo FromProto(const v1::Model& model);
+BindingInfo FromProto(const v1::Binding& binding);
+SessionInfo FromProto(const v1::Session& session);
+SchemeInfo FromProto(const v1::Scheme& scheme);
+
+// InvalidArgument (BAD_ANSWER) if the numbers do not fit together.
+absl::StatusOr<RigArrays> FromProto(const v1::Rig& rig);
+absl::StatusOr<WeightRows> FromProto(const v1::GetWeightsResponse& weights);
+absl::StatusOr<Joined> FromProto(const v1::Joined& joined);
+
+// `tenant` and `model_id` included.
+v1::CreateBindingRequest ToProto(const BindingSpec& spec,
+                                 const std::string& tenant);
+v1::Pose ToProto(const PoseUpdate& update, int dimension, uint64_t sequence);
+
+// The bytes of a model as the upload holds them: doubles, then corners.
+class ModelBytes {
+ public:
+  explicit ModelBytes(const ModelArrays& model);
+  int64_t size() const;
+  // Bytes [offset, offset + count); count > 0 and within size().
+  std::string Range(int64_t offset, int64_t count) const;
+
+ private:
+  std::vector<double> positions_;
+  std::vector<uint32_t> corners_;
+};
+
+}  // namespace deform

@@ -1,0 +1,80 @@
+// What the server tells about the things it keeps.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/mesh/types.h"
+
+namespace deform {
+
+using WallTime = std::chrono::system_clock::time_point;
+
+struct ModelInfo {
+  std::string model_id;  // Content address.
+  std::string display_name;
+  int dimension = 0;
+  int64_t vertex_count = 0;
+  int64_t face_count = 0;
+  std::vector<double> box_min;  // `dimension` numbers.
+  std::vector<double> box_max;
+  WallTime create_time;
+  // From RegisterModel only: it was registered before.
+  bool existed = false;
+};
+
+// Points that could not be bound; they rest where they are in every pose.
+struct UnboundInfo {
+  std::string reason;  // "EXTERIOR_NO_EXIT_FACE"
+  std::vector<int64_t> points;
+};
+
+// A connected part of the model outside the cage.
+struct ExitPartInfo {
+  int64_t exit_face = 0;
+  int64_t point_count = 0;
+  int64_t first_point = 0;
+  std::vector<int64_t> crossed_faces;
+};
+
+struct BindingInfo {
+  std::string binding_id;  // Content address.
+  std::string model_id;
+  std::string scheme;
+  int dimension = 0;
+  int64_t point_count = 0;
+  int64_t vertex_count = 0;  // Rows of a pose.
+  int64_t normal_count = 0;  // Weight columns of face normals.
+  double rig_diagonal = 0;   // D, model units.
+  int64_t weight_bytes = 0;
+  double compute_seconds = 0;
+  double reproduction_error = 0;  // In units of D.
+  double weight_sum_max = 0;
+  int64_t unbound_count = 0;
+  std::vector<UnboundInfo> unbound;
+  std::vector<ExitPartInfo> exit_parts;
+  std::vector<std::string> warnings;
+  WallTime create_time;
+  // From CreateBinding only: it was there before.
+  bool existed = false;
+};
+
+struct SessionInfo {
+  std::string session_id;
+  std::string binding_id;
+  uint64_t revision = 0;  // 0 is the rest pose.
+  uint64_t epoch = 0;
+  int participant_count = 0;
+  WallTime create_time;
+};
+
+struct SchemeInfo {
+  std::string scheme;
+  std::string description;
+  bool takes_cage = false;  // Else handles.
+  bool uses_normals = false;
+};
+
+}  // namespace deform

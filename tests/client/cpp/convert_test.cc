@@ -1,0 +1,142 @@
+#include "client/cpp/convert.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace deform {
+namespace {
+
+using testing::ElementsAre;
+
+Positions Rows(std::initializer_list<std::array<double, 3>> rows) {
+  Positions result(rows.size(), 3);
+  int i = 0;
+  for (const auto& row : rows) result.row(i++) << row[0], row[1], row[2];
+  return result;
+}
+
+TEST(ModelBytes, HoldsDoublesThenCornersWhereverItIsCut) {
+  Faces faces(1, 3);
+  faces << 0, 2, 1;
+  const ModelBytes bytes(
+      ModelArrays(3, Rows({{1, 2, 3}, {4, 5, 6}, {7, 8, 9}}), faces));
+  ASSERT_EQ(bytes.size(), 9 * 8 + 3 * 4);
+  const std::string whole = bytes.Range(0, bytes.size());
+  for (int64_t cut = 1; cut < bytes.size(); ++cut) {
+    EXPECT_EQ(bytes.Range(0, cut) + bytes.Range(cut, bytes.size() - cut), whole)
+        << cut;
+  }
+  double last = 0;
+  std::memcpy(&last, whole.data() + 64, 8);
+  EXPECT_EQ(last, 9);
+  uint32_t corner = 0;
+  std::memcpy(&corner, whole.data() + 76, 4);
+  EXPECT_EQ(corner, 2u);
+}
+
+TEST(ModelBytes, LeavesTheThirdColumnOutIn2d) {
+  EXPECT_EQ(ModelBytes(ModelArrays(2, Rows({{1, 2, 0}}), Faces())).size(), 16);
+}
+
+TEST(BindingRequest, CarriesWrongNumbersToTheServerAsTheyAre) {
+  BindingSpec spec;
+  spec.rig.vertices =
+      Rows({{std::nan(""), std::numeric_limits<double>::infinity(), 0}});
+  spec.rig.faces.resize(1, 3);
+  spec.rig.faces << 0, -1, 99;
+  const v1::CreateBindingRequest request = ToProto(spec, "t");
+  EXPECT_TRUE(std::isnan(request.rig().cage().vertices(0)));
+  EXPECT_TRUE(std::isinf(request.rig().cage().vertices(1)));
+  EXPECT_THAT(request.rig().cage().corners(), ElementsAre(0, 0xffffffffu, 99));
+}
+
+TEST(BindingRequest, SaysHowOutsidePointsAreReached) {
+  BindingSpec spec;
+  EXPECT_FALSE(ToProto(spec, "").has_exits());
+  spec.exits.kind = ExitRegions::Kind::kAutomatic;
+  EXPECT_TRUE(ToProto(spec, "").exits().has_automatic());
+  spec.exits.kind = ExitRegions::Kind::kPerPoint;
+  spec.exits.face_of_point = {-1, 4};
+  EXPECT_THAT(ToProto(spec, "").exits().per_point().faces(),
+              ElementsAre(-1, 4));
+  spec.exits.kind = ExitRegions::Kind::kFaces;
+  spec.exits.faces = {3};
+  EXPECT_THAT(ToProto(spec, "").exits().faces().faces(), ElementsAre(3));
+}
+
+TEST(BindingRequest, KeepsHandlesAndTheirWeights) {
+  BindingSpec spec;
+  spec.rig = RigArrays(RigKind::kHandles, 2, Rows({{1, 2, 0}, {3, 4, 0}}), {});
+  spec.options.handle_weights = {0.5, 0};
+  const v1::CreateBindingRequest request = ToProto(spec, "");
+  EXPECT_THAT(request.rig().handles().positions(), ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(request.options().handle_weights(), ElementsAre(0.5, 0));
+}
+
+TEST(PoseMessage, CarriesTheBlendOnlyWhenItIsSet) {
+  PoseUpdate update{.vertices = {4}, .positions = Rows({{1, 2, 3}})};
+  EXPECT_FALSE(ToProto(update, 3, 1).has_stretch_blend());
+  update.stretch_blend = 0;
+  const v1::Pose pose = ToProto(update, 3, 9);
+  EXPECT_TRUE(pose.has_stretch_blend());
+  EXPECT_EQ(pose.sequence(), 9u);
+  EXPECT_THAT(pose.vertices(), ElementsAre(4));
+  EXPECT_THAT(pose.positions(), ElementsAre(1, 2, 3));
+}
+
+TEST(Weights, FloatsAndDoublesAreSplitIntoVertexAndNormalColumns) {
+  v1::GetWeightsResponse response;
+  response.set_point_count(1);
+  response.set_vertex_count(2);
+  response.set_normal_count(1);
+  const float row[] = {0.25f, 0.75f, -1.5f};
+  response.set_data(row, sizeof(row));
+  const WeightRows rows = FromProto(response).value();
+  EXPECT_EQ(rows.vertex(0, 1), 0.75);
+  EXPECT_EQ(rows.normal(0, 0), -1.5);
+}
+
+TEST(Weights, BytesThatDoNotMakeRowsAreRefused) {
+  v1::GetWeightsResponse response;
+  response.set_point_count(2);
+  response.set_vertex_count(2);
+  response.set_data(std::string(12, 'x'));
+  EXPECT_FALSE(FromProto(response).ok());
+  response.set_vertex_count(0);
+  EXPECT_FALSE(FromProto(response).ok());
+}
+
+TEST(RigOfABinding, IsReadBackAsItWasSent) {
+  Faces faces(2, 2);
+  faces << 0, 1, 1, 0;
+  BindingSpec spec;
+  spec.rig = RigArrays(RigKind::kCage, 2, Rows({{1, 2, 0}, {3, 4, 0}}), faces);
+  const RigArrays back = FromProto(ToProto(spec, "").rig()).value();
+  EXPECT_EQ(back.dimension, 2);
+  EXPECT_EQ(back.vertices, spec.rig.vertices);
+  EXPECT_EQ(back.faces, faces);
+}
+
+TEST(RigOfABinding, IsRefusedIfItsNumbersDoNotFit) {
+  v1::Rig rig;
+  EXPECT_FALSE(FromProto(rig).ok());
+  rig.mutable_cage()->set_dimension(3);
+  rig.mutable_cage()->add_vertices(1);
+  EXPECT_FALSE(FromProto(rig).ok());
+}
+
+TEST(JoinedSession, NeedsAPoseOfItsVertexCount) {
+  v1::Joined joined;
+  joined.set_dimension(3);
+  joined.set_vertex_count(2);
+  for (int i = 0; i < 3; ++i) joined.add_pose(i);
+  EXPECT_FALSE(FromProto(joined).ok());
+  joined.set_vertex_count(1);
+  EXPECT_EQ(FromProto(joined).value().pose.vertices(0, 2), 2);
+}
+
+}  // namespace
+}  // namespace deform

@@ -1,0 +1,126 @@
+// Green coordinates: closure of the integrals and extension through an exit
+// face, alike in 2D and 3D.
+//
+// Source: Lipman, Levin, Cohen-Or, "Green Coordinates", ACM TOG 27(3), 2008
+//   [L08], section 4.2 and Eq. 17-19.
+// Departs: on the boundary the limit from inside instead of the factor 1/2 of
+//   section 4, which holds within a face only; alpha by distances from the
+//   edges of the exit face instead of a linear system.
+
+#include "core/weights/schemes/green.h"
+
+#include <cmath>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/weights/cage_faces.h"
+
+namespace deform {
+namespace {
+
+class GreenEvaluator : public WeightEvaluator {
+ public:
+  explicit GreenEvaluator(const Cage& cage)
+      : faces_(cage),
+        tolerance_(BoundaryTolerance(cage)),
+        integrals_(cage.dimension() == 2 ? MakeGreen2d(cage)
+                                         : MakeGreen3d(cage)) {}
+
+  void Evaluate(const PositionsRef& points, WeightBlock& block) const override;
+  void Extend(const Vec3& point, int64_t exit_face, std::span<double> vertex,
+              std::span<double> normal) const override;
+
+ private:
+  using Row = Eigen::Ref<Eigen::RowVectorXd>;
+  PointState Close(const Vec3& eta, bool touches, Row phi) const;
+
+  const CageFaces faces_;
+  const double tolerance_;
+  const std::unique_ptr<const GreenIntegrals> integrals_;
+};
+
+// Makes phi of eta sum to 1 inside and on the boundary, to 0 outside, by adding
+// what is missing at the closest point of the cage. Off the boundary this
+// removes rounding: it comes from the solid angles of the faces close by, which
+// multiply the same barycentrics. On the boundary it is the step of the limit
+// from inside, at faces, edges and vertices alike.
+PointState GreenEvaluator::Close(const Vec3& eta, bool touches, Row phi) const {
+  const double winding = phi.sum();
+  // Before the closure, which would hide it.
+  if (!(winding > -0.5 && winding < 1.5)) return PointState::kOverlap;
+  const bool inside = winding > 0.5;
+  const double missing = (inside ? 1 : 0) - winding;
+  const PointState state = inside ? PointState::kInside : PointState::kOutside;
+  if (!touches && std::abs(missing) < 1e-14) return state;
+
+  const CageFaces::Nearest nearest = faces_.NearestOf(eta);
+  const bool boundary = nearest.distance <= tolerance_;
+  for (int k = 0; k < faces_.corners(); ++k) {
+    phi[faces_[nearest.face].corner[k]] +=
+        (boundary ? 1 - winding : missing) * nearest.barycentric[k];
+  }
+  return boundary ? PointState::kBoundary : state;
+}
+
+void GreenEvaluator::Evaluate(const PositionsRef& points,
+                              WeightBlock& block) const {
+  std::vector<char> touches;
+  integrals_->Integrate(points, block.vertex, block.normal, touches);
+  block.iterations.clear();
+  block.states.resize(points.rows());
+  for (int64_t i = 0; i < points.rows(); ++i) {
+    block.states[i] = Close(points.row(i), touches[i], block.vertex.row(i));
+    if (block.states[i] == PointState::kOutside ||
+        block.states[i] == PointState::kOverlap) {
+      block.vertex.row(i).setZero();
+      block.normal.row(i).setZero();
+    }
+  }
+}
+
+void GreenEvaluator::Extend(const Vec3& point, int64_t exit_face,
+                            std::span<double> vertex,
+                            std::span<double> normal) const {
+  RowMatrix phi, psi;
+  std::vector<char> touches;
+  integrals_->Integrate(point.transpose(), phi, psi, touches);
+  Close(point, touches[0], phi.row(0));
+  const CageFaces::Face& face = faces_[exit_face];
+  const Vec3 alpha = faces_.Barycentric(exit_face, point);
+  for (int k = 0; k < faces_.corners(); ++k) phi(face.corner[k]) += alpha[k];
+  psi(exit_face) += faces_.Height(exit_face, point);
+  for (size_t k = 0; k < vertex.size(); ++k) vertex[k] += phi(k);
+  for (size_t j = 0; j < normal.size(); ++j) normal[j] += psi(j);
+}
+
+class Green : public CoordinateScheme {
+ public:
+  absl::string_view id() const override { return "green"; }
+  absl::string_view description() const override {
+    return "Green coordinates: cage, conformal in 2D, quasi-conformal in 3D";
+  }
+  RigKind rig_kind() const override { return RigKind::kCage; }
+  bool uses_normals() const override { return true; }
+
+  absl::StatusOr<std::unique_ptr<const WeightEvaluator>> Prepare(
+      const Rig& rig, const SchemeOptions& options) const override {
+    const Cage* cage = std::get_if<Cage>(&rig);
+    if (cage == nullptr) {
+      return InvalidInput("WRONG_RIG", "rig", "Green coordinates need a cage");
+    }
+    if (!options.handle_weights.empty() || options.lambda != 0) {
+      return InvalidInput("INVALID_OPTION", "options",
+                          "Green coordinates take no options");
+    }
+    return std::make_unique<GreenEvaluator>(*cage);
+  }
+};
+
+}  // namespace
+
+const CoordinateScheme& GreenScheme() {
+  static const Green scheme;
+  return scheme;
+}
+
+}  // namespace deform

@@ -5,6 +5,8 @@
 
 #include <Eigen/Geometry>
 
+#include "core/mesh/triangle.h"
+
 namespace deform {
 namespace {
 
@@ -61,15 +63,6 @@ CageFaces::Face Segment(const Vec3& v0, const Vec3& v1) {
 }
 
 }  // namespace
-
-Vec3 AreaVector(const Vec3& v0, const Vec3& v1, const Vec3& v2) {
-  const Vec3 e0 = v2 - v1, e1 = v0 - v2, e2 = v1 - v0;
-  const double l0 = e0.squaredNorm(), l1 = e1.squaredNorm(),
-               l2 = e2.squaredNorm();
-  if (l0 >= l1 && l0 >= l2) return e1.cross(e2);
-  if (l1 >= l2) return e2.cross(e0);
-  return e0.cross(e1);
-}
 
 CageFaces::CageFaces(const Cage& cage) : corners_(cage.dimension()) {
   faces_.reserve(cage.face_count());

@@ -53,8 +53,4 @@ class CageFaces {
   std::vector<Face> faces_;
 };
 
-// Twice the area of a triangle times its unit normal, from the two shorter
-// edges: the error of a thin triangle grows with their product.
-Vec3 AreaVector(const Vec3& v0, const Vec3& v1, const Vec3& v2);
-
 }  // namespace deform

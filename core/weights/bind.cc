@@ -1,0 +1,393 @@
+// Bind(): evaluate all points, send the outside ones through exit faces, extend
+// these, report.
+
+#include "core/weights/binding.h"
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/error.h"
+#include "core/base/mutex.h"
+#include "core/base/status_macros.h"
+#include "core/weights/blocks.h"
+#include "core/weights/cage_faces.h"
+#include "core/weights/unbindable.h"
+
+namespace deform {
+namespace {
+
+bool IsBound(PointState state) {
+  return state == PointState::kInside || state == PointState::kBoundary ||
+         state == PointState::kBoundOutside;
+}
+
+int64_t Columns(const Rig& rig, bool uses_normals) {
+  const Cage* cage = std::get_if<Cage>(&rig);
+  return RestVertices(rig).rows() +
+         (cage != nullptr && uses_normals ? cage->face_count() : 0);
+}
+
+// What the rows of some points showed. Merging does not depend on the order, so
+// neither do the figures on the threads.
+struct Figures {
+  double reproduction_error = 0;
+  double weight_sum_max = 0;
+  int iterations_max = 0;
+  int64_t iterations = 0;
+  int64_t iterated_points = 0;
+  std::vector<int64_t> too_large;
+
+  void Merge(const Figures& other) {
+    reproduction_error = std::max(reproduction_error, other.reproduction_error);
+    weight_sum_max = std::max(weight_sum_max, other.weight_sum_max);
+    iterations_max = std::max(iterations_max, other.iterations_max);
+    iterations += other.iterations;
+    iterated_points += other.iterated_points;
+    too_large.insert(too_large.end(), other.too_large.begin(),
+                     other.too_large.end());
+  }
+};
+
+// Computes the weights of one request into Parts.
+class Binder {
+ public:
+  Binder(const BindRequest& request, const BindControl& control,
+         const WeightEvaluator& evaluator, Binding::Parts& parts);
+
+  // The steps, in order.
+  absl::Status EvaluateAll();
+  absl::Status CheckOverlap() const;
+  void AssignExits();
+  absl::Status ExtendOutside();
+  void Finish();
+
+ private:
+  using Row = Eigen::Ref<const Eigen::RowVectorXd>;
+
+  const Positions& points() const { return parts_.model->positions(); }
+  // False if cancelled.
+  bool ForEach(int64_t count, absl::FunctionRef<void(int64_t)> body) const;
+  // Rounds a row to float and measures it.
+  void Store(int64_t point, Row vertex, Row normal, Figures& figures);
+  void EvaluateBlock(Block at);
+  void ExtendBlock(Block at);
+  void Report(const Figures& figures, int64_t points_done)
+      ABSL_LOCKS_EXCLUDED(mutex_);
+  void ListUnbound();
+  void Warn();
+
+  const BindRequest& request_;
+  const BindControl& control_;
+  const WeightEvaluator& evaluator_;
+  Binding::Parts& parts_;
+
+  const int64_t block_points_;
+  const Vec3 center_;                // Of the rig's bounding box.
+  Positions vertices_;               // Rig vertices relative to the centre.
+  Positions normals_;                // Rest normals, one per normal column.
+  std::vector<PointState> states_;   // N
+  std::vector<int32_t> exit_faces_;  // N, -1 for none.
+  std::vector<UnboundPoints> unassigned_;
+
+  Mutex mutex_;
+  Figures figures_ ABSL_GUARDED_BY(mutex_);
+};
+
+Binder::Binder(const BindRequest& request, const BindControl& control,
+               const WeightEvaluator& evaluator, Binding::Parts& parts)
+    : request_(request),
+      control_(control),
+      evaluator_(evaluator),
+      parts_(parts),
+      block_points_(BlockPoints(parts.weights.columns())),
+      center_(BoxOf(RestVertices(parts.rig)).center()),
+      vertices_(RestVertices(parts.rig).rowwise() - center_.transpose()),
+      states_(parts.model->size()),
+      exit_faces_(parts.model->size(), -1) {
+  if (parts.weights.columns() == vertices_.rows()) return;
+  const CageFaces faces(std::get<Cage>(parts.rig));
+  normals_.resize(faces.size(), 3);
+  for (int64_t f = 0; f < faces.size(); ++f) {
+    normals_.row(f) = faces[f].normal;
+  }
+}
+
+bool Binder::ForEach(int64_t count,
+                     absl::FunctionRef<void(int64_t)> body) const {
+  if (control_.pool != nullptr) {
+    return control_.pool->ParallelFor(count, control_.cancellation, body);
+  }
+  for (int64_t i = 0; i < count; ++i) {
+    if (control_.cancellation != nullptr &&
+        control_.cancellation->cancelled()) {
+      return false;
+    }
+    body(i);
+  }
+  return true;
+}
+
+void Binder::Store(int64_t point, Row vertex, Row normal, Figures& figures) {
+  const double largest =
+      std::max(vertex.cwiseAbs().maxCoeff(),
+               normal.size() == 0 ? 0.0 : normal.cwiseAbs().maxCoeff());
+  if (!(largest <= std::numeric_limits<float>::max())) {
+    figures.too_large.push_back(point);
+    return;
+  }
+  for (int64_t k = 0; k < vertex.size(); ++k) {
+    parts_.weights.set(point, k, static_cast<float>(vertex[k]));
+  }
+  for (int64_t j = 0; j < normal.size(); ++j) {
+    parts_.weights.set(point, vertex.size() + j, static_cast<float>(normal[j]));
+  }
+  // Positions count from the middle of the rig: how coarse doubles are far from
+  // the origin is not the weights' doing.
+  Eigen::RowVector3d x = vertex * vertices_;
+  if (normal.size() > 0) x += normal * normals_;
+  const Eigen::RowVector3d eta = points().row(point) - center_.transpose();
+  figures.reproduction_error = std::max(
+      figures.reproduction_error, (x - eta).norm() / DiagonalOf(parts_.rig));
+  figures.weight_sum_max =
+      std::max(figures.weight_sum_max, vertex.cwiseAbs().sum());
+}
+
+void Binder::EvaluateBlock(Block at) {
+  WeightBlock block;
+  evaluator_.Evaluate(points().middleRows(at.first, at.count), block);
+  Figures figures;
+  int64_t done = 0;
+  for (int64_t i = 0; i < at.count; ++i) {
+    const PointState state = block.states[i];
+    states_[at.first + i] = state;
+    done += state != PointState::kOutside;  // Those wait for their exit face.
+    if (!IsBound(state)) continue;
+    Store(at.first + i, block.vertex.row(i), block.normal.row(i), figures);
+    if (block.iterations.empty()) continue;
+    figures.iterations_max =
+        std::max<int>(figures.iterations_max, block.iterations[i]);
+    figures.iterations += block.iterations[i];
+    ++figures.iterated_points;
+  }
+  Report(figures, done);
+}
+
+void Binder::Report(const Figures& figures, int64_t points_done) {
+  {
+    MutexLock lock(mutex_);
+    figures_.Merge(figures);
+  }
+  if (control_.points_done != nullptr) *control_.points_done += points_done;
+}
+
+absl::Status Binder::EvaluateAll() {
+  const int64_t n = points().rows();
+  const int64_t blocks = (n + block_points_ - 1) / block_points_;
+  const bool finished = ForEach(blocks, [&](int64_t index) {
+    EvaluateBlock(BlockAt(index, block_points_, n));
+  });
+  if (!finished) return absl::CancelledError("binding was cancelled");
+  return absl::OkStatus();
+}
+
+absl::Status Binder::CheckOverlap() const {
+  const auto at =
+      std::find(states_.begin(), states_.end(), PointState::kOverlap);
+  if (at == states_.end()) return absl::OkStatus();
+  return InvalidInput(
+      "CAGE_OVERLAPPING", "rig.cage.corners",
+      absl::StrCat("the cage winds neither 0 nor 1 times around point ",
+                   at - states_.begin(),
+                   ": parts of it overlap or are inside out"));
+}
+
+void Binder::AssignExits() {
+  const Cage* cage = std::get_if<Cage>(&parts_.rig);
+  if (cage == nullptr) return;
+  ExitAssignment exits =
+      AssignExitFaces(*parts_.model, *cage, states_, request_.exits);
+  for (const ExitPart& part : exits.parts) {
+    for (int64_t i : part.points) exit_faces_[i] = part.exit_face;
+  }
+  parts_.exit_parts = std::move(exits.parts);
+  unassigned_ = std::move(exits.unbound);
+}
+
+void Binder::ExtendBlock(Block at) {
+  Figures figures;
+  int64_t done = 0;
+  Eigen::RowVectorXd vertex(vertices_.rows()), normal(normals_.rows());
+  for (int64_t i = at.first; i < at.first + at.count; ++i) {
+    done += states_[i] == PointState::kOutside;
+    if (exit_faces_[i] < 0) continue;
+    vertex.setZero();
+    normal.setZero();
+    evaluator_.Extend(points().row(i), exit_faces_[i],
+                      {vertex.data(), static_cast<size_t>(vertex.size())},
+                      {normal.data(), static_cast<size_t>(normal.size())});
+    Store(i, vertex, normal, figures);
+  }
+  Report(figures, done);
+}
+
+absl::Status Binder::ExtendOutside() {
+  ListUnbound();
+  if (request_.unbindable == Unbindable::kFail) {
+    DEFORM_RETURN_IF_ERROR(UnbindableError(parts_.unbound));
+  }
+  // Only blocks that have something to do.
+  const int64_t n = points().rows();
+  std::vector<int64_t> blocks;
+  for (int64_t i = 0; i < n; ++i) {
+    if (states_[i] != PointState::kOutside) continue;
+    blocks.push_back(i / block_points_);
+    i = BlockAt(blocks.back() + 1, block_points_, n).first - 1;
+  }
+  const bool finished = ForEach(blocks.size(), [&](int64_t k) {
+    ExtendBlock(BlockAt(blocks[k], block_points_, n));
+  });
+  if (!finished) return absl::CancelledError("binding was cancelled");
+  ListUnbound();
+  if (request_.unbindable == Unbindable::kFail) {
+    return UnbindableError(parts_.unbound);
+  }
+  return absl::OkStatus();
+}
+
+void Binder::ListUnbound() {
+  parts_.unbound = unassigned_;
+  const auto add = [&](absl::string_view reason, std::vector<int64_t> points) {
+    if (points.empty()) return;
+    parts_.unbound.push_back({std::string(reason),
+                              UnboundAdvice(std::string(reason)),
+                              std::move(points)});
+  };
+  for (const PointState state :
+       {PointState::kOutsideHull, PointState::kNotConverged}) {
+    std::vector<int64_t> found;
+    for (size_t i = 0; i < states_.size(); ++i) {
+      if (states_[i] == state) found.push_back(static_cast<int64_t>(i));
+    }
+    add(UnboundReason(state), std::move(found));
+  }
+  MutexLock lock(mutex_);
+  std::sort(figures_.too_large.begin(), figures_.too_large.end());
+  add(kWeightTooLarge, figures_.too_large);
+}
+
+// Handles at the same place; nearly always a mistake.
+std::vector<std::string> CoincidenceWarnings(const Positions& handles) {
+  std::vector<int64_t> order(handles.rows());
+  std::iota(order.begin(), order.end(), 0);
+  const auto key = [&](int64_t i) {
+    return std::tuple(handles(i, 0), handles(i, 1), handles(i, 2), i);
+  };
+  std::sort(order.begin(), order.end(),
+            [&](int64_t a, int64_t b) { return key(a) < key(b); });
+  std::vector<std::string> warnings;
+  for (size_t i = 1; i < order.size(); ++i) {
+    if (handles.row(order[i - 1]) != handles.row(order[i])) continue;
+    warnings.push_back(absl::StrCat("handles ", order[i - 1], " and ", order[i],
+                                    " coincide and share their weight"));
+  }
+  return warnings;
+}
+
+void Binder::Warn() {
+  std::vector<std::string>& warnings = parts_.warnings;
+  if (const Handles* handles = std::get_if<Handles>(&parts_.rig)) {
+    warnings = CoincidenceWarnings(handles->positions());
+  }
+  for (const ExitPart& part : parts_.exit_parts) {
+    if (part.crossed_faces.empty()) continue;
+    warnings.push_back(absl::StrCat(
+        "the ", part.points.size(), " points around point ",
+        part.points.front(), " leave through face ", part.exit_face,
+        " and also cross ", part.crossed_faces.size(),
+        " other faces, such as face ", part.crossed_faces.front(),
+        ": the map is smooth there only while these move alike"));
+  }
+  const int64_t outside =
+      std::count(states_.begin(), states_.end(), PointState::kBoundOutside);
+  if (outside > 0) {
+    warnings.push_back(absl::StrCat(outside,
+                                    " points lie outside the cage; this scheme "
+                                    "extends to them without an exit face"));
+  }
+  constexpr size_t kMaxWarnings = 100;
+  if (warnings.size() > kMaxWarnings) {
+    const size_t more = warnings.size() - kMaxWarnings;
+    warnings.resize(kMaxWarnings);
+    warnings.push_back(absl::StrCat("and ", more, " more of the same kinds"));
+  }
+}
+
+void Binder::Finish() {
+  Warn();
+  MutexLock lock(mutex_);
+  parts_.quality = {
+      .reproduction_error = figures_.reproduction_error,
+      .weight_sum_max = figures_.weight_sum_max,
+      .iterations_max = figures_.iterations_max,
+      .iterations_mean =
+          figures_.iterated_points == 0
+              ? 0
+              : static_cast<double>(figures_.iterations) /
+                    static_cast<double>(figures_.iterated_points)};
+}
+
+absl::Status CheckFits(const BindRequest& request) {
+  if (request.model->dimension() != DimensionOf(request.rig)) {
+    return InvalidInput(
+        "DIMENSION_MISMATCH", "rig",
+        absl::StrCat("the model is ", request.model->dimension(),
+                     "D and its rig ", DimensionOf(request.rig), "D"));
+  }
+  if (const Cage* cage = std::get_if<Cage>(&request.rig)) {
+    return CheckExitRegions(request.exits, *cage, request.model->size());
+  }
+  if (request.exits.kind != ExitRegions::Kind::kNone) {
+    return InvalidInput("WRONG_RIG", "exits",
+                        "exit faces belong to a cage; handles have none");
+  }
+  return absl::OkStatus();
+}
+
+double SecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
+      .count();
+}
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<const Binding>> Bind(
+    const BindRequest& request, const BindControl& control) {
+  const auto start = std::chrono::steady_clock::now();
+  DEFORM_ASSIGN_OR_RETURN(const CoordinateScheme* scheme,
+                          FindScheme(request.scheme));
+  DEFORM_ASSIGN_OR_RETURN(const auto evaluator,
+                          scheme->Prepare(request.rig, request.options));
+  DEFORM_RETURN_IF_ERROR(CheckFits(request));
+  Binding::Parts parts{
+      .model = request.model,
+      .rig = request.rig,
+      .scheme = scheme,
+      .options = request.options,
+      .weights = WeightTiles(request.model->size(),
+                             Columns(request.rig, scheme->uses_normals()))};
+  Binder binder(request, control, *evaluator, parts);
+  DEFORM_RETURN_IF_ERROR(binder.EvaluateAll());
+  DEFORM_RETURN_IF_ERROR(binder.CheckOverlap());
+  binder.AssignExits();
+  DEFORM_RETURN_IF_ERROR(binder.ExtendOutside());
+  binder.Finish();
+  parts.compute_seconds = SecondsSince(start);
+  return std::make_shared<const Binding>(std::move(parts));
+}
+
+}  // namespace deform

@@ -1,0 +1,128 @@
+#include "core/weights/binding.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/error.h"
+#include "core/base/status_macros.h"
+#include "core/weights/blocks.h"
+
+namespace deform {
+namespace {
+
+// Rows of some points of a binding.
+class Recomputation {
+ public:
+  Recomputation(const Binding& binding, const WeightEvaluator& evaluator,
+                Block range)
+      : binding_(binding), evaluator_(evaluator), range_(range) {
+    block_.vertex.resize(range.count, binding.vertex_count());
+    block_.normal.resize(range.count, binding.normal_count());
+    block_.states.resize(range.count);
+  }
+
+  void Evaluate();
+  void Extend();
+  void ClearFixed();
+  WeightBlock Take() && { return std::move(block_); }
+
+ private:
+  Vec3 Point(int64_t i) const { return binding_.model()->positions().row(i); }
+  bool Contains(int64_t i) const {
+    return i >= range_.first && i < range_.first + range_.count;
+  }
+  void Copy(const WeightBlock& from, Block at);
+
+  const Binding& binding_;
+  const WeightEvaluator& evaluator_;
+  const Block range_;
+  WeightBlock block_;
+};
+
+void Recomputation::Evaluate() {
+  const int64_t n = binding_.point_count();
+  const int64_t step = BlockPoints(binding_.weights().columns());
+  // Solvers start from a neighbour's solution: whole blocks give the same bits.
+  const bool whole = binding_.scheme().rig_kind() == RigKind::kHandles;
+  const int64_t end = range_.first + range_.count;
+  for (int64_t index = range_.first / step; index * step < end; ++index) {
+    Block at = BlockAt(index, step, n);
+    if (!whole) {
+      const int64_t first = std::max(at.first, range_.first);
+      at = {first, std::min(at.first + at.count, end) - first};
+    }
+    WeightBlock block;
+    evaluator_.Evaluate(
+        binding_.model()->positions().middleRows(at.first, at.count), block);
+    Copy(block, at);
+  }
+}
+
+void Recomputation::Copy(const WeightBlock& from, Block at) {
+  if (!from.iterations.empty()) block_.iterations.resize(range_.count);
+  for (int64_t i = 0; i < at.count; ++i) {
+    if (!Contains(at.first + i)) continue;
+    const int64_t to = at.first + i - range_.first;
+    block_.vertex.row(to) = from.vertex.row(i);
+    if (block_.normal.cols() > 0) block_.normal.row(to) = from.normal.row(i);
+    block_.states[to] = from.states[i];
+    if (!from.iterations.empty()) block_.iterations[to] = from.iterations[i];
+  }
+}
+
+void Recomputation::Extend() {
+  for (const ExitPart& part : binding_.exit_parts()) {
+    auto point =
+        std::lower_bound(part.points.begin(), part.points.end(), range_.first);
+    for (; point != part.points.end() && Contains(*point); ++point) {
+      const int64_t row = *point - range_.first;
+      evaluator_.Extend(Point(*point), part.exit_face,
+                        {block_.vertex.row(row).data(),
+                         static_cast<size_t>(block_.vertex.cols())},
+                        {block_.normal.row(row).data(),
+                         static_cast<size_t>(block_.normal.cols())});
+    }
+  }
+}
+
+void Recomputation::ClearFixed() {
+  const std::vector<int64_t>& fixed = binding_.fixed_points();
+  auto point = std::lower_bound(fixed.begin(), fixed.end(), range_.first);
+  for (; point != fixed.end() && Contains(*point); ++point) {
+    block_.vertex.row(*point - range_.first).setZero();
+    block_.normal.row(*point - range_.first).setZero();
+  }
+}
+
+}  // namespace
+
+Binding::Binding(Parts parts) : parts_(std::move(parts)) {
+  for (const UnboundPoints& group : parts_.unbound) {
+    fixed_points_.insert(fixed_points_.end(), group.points.begin(),
+                         group.points.end());
+  }
+  std::sort(fixed_points_.begin(), fixed_points_.end());
+  unbound_count_ = static_cast<int64_t>(fixed_points_.size());
+}
+
+absl::StatusOr<WeightBlock> RecomputeWeights(const Binding& binding,
+                                             int64_t first, int64_t count) {
+  const int64_t n = binding.point_count();
+  if (first < 0 || first > n || count < 0 || count > n - first) {
+    return InvalidInput(
+        "RANGE_OUT_OF_BOUNDS", "first_point",
+        absl::StrCat("there are no ", count, " points from point ", first,
+                     " on; the ", "model has ", n));
+  }
+  DEFORM_ASSIGN_OR_RETURN(
+      const auto evaluator,
+      binding.scheme().Prepare(binding.rig(), binding.options()));
+  Recomputation recomputation(binding, *evaluator, {first, count});
+  recomputation.Evaluate();
+  recomputation.Extend();
+  recomputation.ClearFixed();
+  return std::move(recomputation).Take();
+}
+
+}  // namespace deform

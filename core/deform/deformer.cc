@@ -38,7 +38,6 @@ Deformer::Deformer(std::shared_ptr<const Binding> binding, ThreadPool* pool)
     fixed_.assign(binding_->point_count(), 0);
     for (const int64_t point : binding_->fixed_points()) fixed_[point] = 1;
   }
-  residual_limit_ = DiagonalOf(binding_->rig());
 }
 
 DeformReport Deformer::MoveTo(const Pose& pose, Path path) {
@@ -82,12 +81,14 @@ bool Deformer::PrefersFull(const std::vector<int32_t>& changed,
   // the sums besides.
   if (static_cast<int64_t>(changed.size()) * 2 > columns_.rows()) return true;
   if (steps_since_full_ >= kMaxSteps) return true;
-  // Float weights lose digits in proportion to the residuals: when a pose has
-  // wandered off its fitted map step by step, fit it anew.
-  return std::any_of(changed.begin(), changed.end(), [&](int32_t c) {
-    return c < posed_columns_.vertex_count() &&
-           !(Residual(map_, posed_columns_, next, c).norm() <= residual_limit_);
-  });
+  // Float weights lose digits in proportion to the residuals. A fresh fit
+  // leaves them within about the size of the pose; when steps have carried the
+  // pose further off its map than that, fit it anew.
+  const double limit = 2 * BoxOf(pose_.vertices).diagonal();
+  for (int64_t v = 0; v < posed_columns_.vertex_count(); ++v) {
+    if (!(Residual(map_, posed_columns_, next, v).norm() <= limit)) return true;
+  }
+  return false;
 }
 
 void Deformer::ApplyAll() {
@@ -95,17 +96,12 @@ void Deformer::ApplyAll() {
   map_ = FitSimilarity(RestVertices(binding_->rig()), pose_.vertices,
                        binding_->dimension());
   std::vector<float> residuals(columns_.rows() * 3);
-  double largest = 0;
   for (int64_t c = 0; c < columns_.rows(); ++c) {
     const Vec3 residual = Residual(map_, posed_columns_, columns_, c);
-    if (c < posed_columns_.vertex_count()) {
-      largest = std::max(largest, residual.norm());
-    }
     for (int d = 0; d < 3; ++d) {
       residuals[c * 3 + d] = static_cast<float>(residual(d));
     }
   }
-  residual_limit_ = std::max(2 * largest, BoxOf(pose_.vertices).diagonal());
   ForEachTile([&](int64_t t) {
     float sums[3 * kTilePoints];
     ApplyTile(binding_->weights().tile(t), columns_.rows(), residuals.data(),

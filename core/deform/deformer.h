@@ -75,8 +75,6 @@ class Deformer {
   Pose pose_;
   Columns columns_;  // Of pose_.
   AffineMap map_;    // T, as of the last full pass.
-  // What the residual columns may grow to until T is fitted anew.
-  double residual_limit_ = 0;
   int steps_since_full_ = 0;
   std::vector<double> displacement_;  // tiles x 3 x 16, the two sums above.
 };

@@ -7,7 +7,9 @@
 
 // To add a scheme: write schemes/<name>.cc, which defines
 // `const CoordinateScheme& <Name>Scheme()`, then add one line here.
-#define DEFORM_SCHEMES(X) X(Green)
+#define DEFORM_SCHEMES(X) \
+  X(Green)                \
+  X(MeanValue)
 
 namespace deform {
 

@@ -9,6 +9,8 @@
 // `const CoordinateScheme& <Name>Scheme()`, then add one line here.
 #define DEFORM_SCHEMES(X) \
   X(Green)                \
+  X(TranslationCelestial) \
+  X(ScalingCelestial)     \
   X(MeanValue)
 
 namespace deform {

@@ -1,0 +1,252 @@
+#include "core/weights/schemes/celestial_newton.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace deform {
+namespace {
+
+constexpr double kTargetResidual = 1e-15;
+// Above it the search goes on in long double.
+constexpr double kWideResidual = 1e-12;
+// Below these residuals a search that has not halved its residual in so many
+// steps has met the rounding floor.
+constexpr double kDeepFloor = 1e-13;
+constexpr int kDeepPatience = 1;
+constexpr double kShallowFloor = 1e-4;
+constexpr int kShallowPatience = 5;
+constexpr int kMaxSteps = 120;
+// exp(600) can still be summed and cubed roots of it multiplied.
+constexpr double kMaxExponent = 600;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+template <class Real>
+using Vector = Eigen::Matrix<Real, 3, 1>;
+
+template <class Real>
+double ExponentIn(const Directions& q, int64_t i, const Vector<Real>& y) {
+  return static_cast<double>(q.x[i] * y.x() + q.y[i] * y.y() + q.z[i] * y.z());
+}
+
+// Phi and its derivatives at a point y, and what else one pass can tell.
+struct Moments {
+  double value = 0;
+  double magnitude = 0;  // Of the terms of `value`, which may cancel.
+  Vec3 gradient = Vec3::Zero();
+  double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;  // Hessian.
+  double beta_sum = 0;
+  double largest_exponent = -kInfinity;
+
+  double residual() const { return gradient.norm() / beta_sum; }
+};
+
+template <class Potential, class Real>
+Moments MomentsAt(const Directions& q, const Potential& potential,
+                  const Vector<Real>& y) {
+  Moments m;
+  for (int64_t i = 0; i < q.size(); ++i) {
+    const double u = ExponentIn(q, i, y);
+    const PotentialTerms terms = potential.At(i, u);
+    m.value += terms.value;
+    m.magnitude += std::abs(terms.value);
+    m.beta_sum += terms.beta;
+    m.gradient += terms.beta * q.q(i);
+    const double cx = terms.curvature * q.x[i];
+    const double cy = terms.curvature * q.y[i];
+    m.xx += cx * q.x[i];
+    m.xy += cx * q.y[i];
+    m.xz += cx * q.z[i];
+    m.yy += cy * q.y[i];
+    m.yz += cy * q.z[i];
+    m.zz += terms.curvature * q.z[i] * q.z[i];
+    m.largest_exponent = std::max(m.largest_exponent, u);
+  }
+  return m;
+}
+
+// Solves A x = b for a symmetric positive semidefinite A by pivoted LDL^T after
+// scaling the diagonal to 1: near the hull A has a condition of 1 / distance,
+// nearly all of it in the scaling. Directions without curvature get 0.
+Vec3 SolveSemidefinite(const Eigen::Matrix3d& matrix, const Vec3& b) {
+  Vec3 scale;
+  for (int k = 0; k < 3; ++k) {
+    scale[k] = matrix(k, k) > 0 ? 1 / std::sqrt(matrix(k, k)) : 0;
+  }
+  Eigen::Matrix3d a = scale.asDiagonal() * matrix * scale.asDiagonal();
+  Vec3 x = scale.cwiseProduct(b);
+  int order[3] = {0, 1, 2};
+  for (int k = 0; k < 3; ++k) {
+    int best = k;
+    for (int j = k + 1; j < 3; ++j) {
+      if (a(order[j], order[j]) > a(order[best], order[best])) best = j;
+    }
+    std::swap(order[k], order[best]);
+    const int p = order[k];
+    if (!(a(p, p) > 0)) {
+      for (int j = k; j < 3; ++j) x[order[j]] = 0, a(order[j], order[j]) = 0;
+      break;
+    }
+    for (int j = k + 1; j < 3; ++j) {
+      const int r = order[j];
+      const double factor = a(r, p) / a(p, p);
+      for (int l = k + 1; l < 3; ++l) a(r, order[l]) -= factor * a(p, order[l]);
+      x[r] -= factor * x[p];
+    }
+  }
+  for (int k = 2; k >= 0; --k) {
+    const int p = order[k];
+    if (!(a(p, p) > 0)) continue;
+    for (int j = k + 1; j < 3; ++j) x[p] -= a(p, order[j]) * x[order[j]];
+    x[p] /= a(p, p);
+  }
+  return scale.cwiseProduct(x);
+}
+
+Vec3 NewtonStep(const Moments& m) {
+  Eigen::Matrix3d hessian;
+  hessian << m.xx, m.xy, m.xz, m.xy, m.yy, m.yz, m.xz, m.yz, m.zz;
+  return SolveSemidefinite(hessian, -m.gradient);
+}
+
+// How far one may go along `step`.
+struct Reach {
+  double length = 1;      // The largest exponent stays below kMaxExponent.
+  bool separates = true;  // q_i . step < 0 for all i.
+};
+
+template <class Real>
+Reach ReachOf(const Directions& q, const Vector<Real>& y, const Vec3& step) {
+  Reach reach;
+  for (int64_t i = 0; i < q.size(); ++i) {
+    const double du = ExponentIn(q, i, step);
+    if (!(du < 0)) reach.separates = false;
+    if (du > 0) {
+      const double room = kMaxExponent - ExponentIn(q, i, y);
+      reach.length = std::min(reach.length, room / du);
+    }
+  }
+  return reach;
+}
+
+template <class Potential, class Real>
+class Descent {
+ public:
+  Descent(const Directions& q, const Potential& potential,
+          const Vector<Real>& start)
+      : q_(q),
+        potential_(potential),
+        y_(Vector<Real>::Zero()),
+        now_(MomentsAt(q, potential, y_)) {
+    if (start.isZero(0) || !start.allFinite()) return;
+    const Moments other = MomentsAt(q_, potential_, start);
+    if (!(other.value < now_.value)) return;
+    y_ = start;
+    now_ = other;
+  }
+
+  NewtonSolution Run() {
+    NewtonSolution best{.residual = kInfinity};
+    double milestone = kInfinity;  // Residual at the last halving.
+    int waited = 0;
+    for (int steps = 0; steps <= kMaxSteps; ++steps) {
+      const double residual = now_.residual();
+      best.iterations = steps;
+      if (residual < best.residual) {
+        best.residual = residual;
+        best.y = y_.template cast<long double>();
+      }
+      if (residual <= kTargetResidual) break;
+      if (now_.largest_exponent < 0) {
+        return Separated(y_.template cast<double>(), best);
+      }
+      waited = residual <= 0.5 * milestone ? 0 : waited + 1;
+      if (waited == 0) milestone = residual;
+      if (waited >= kDeepPatience && best.residual < kDeepFloor) break;
+      if (waited >= kShallowPatience && best.residual < kShallowFloor) break;
+      const Vec3 step = NewtonStep(now_);
+      if (!step.allFinite() || step.isZero(0)) break;
+      const Reach reach = ReachOf(q_, y_, step);
+      if (reach.separates) return Separated(step, best);
+      if (!Advance(step, reach.length)) break;
+    }
+    return best;
+  }
+
+ private:
+  static NewtonSolution Separated(const Vec3& by, NewtonSolution best) {
+    best.separator = by;
+    return best;
+  }
+
+  // Backtracks from `length` until the potential falls enough. Where rounding
+  // hides the fall of the potential, the slope decides.
+  bool Advance(const Vec3& step, double length) {
+    const double slope = now_.gradient.dot(step);
+    for (int halvings = 0; halvings < 60; ++halvings, length *= 0.5) {
+      const Vector<Real> y = y_ + (length * step).template cast<Real>();
+      const Moments next = MomentsAt(q_, potential_, y);
+      const bool falls = next.value <= now_.value + 1e-4 * length * slope;
+      const bool flattens = next.gradient.dot(step) <= 0.1 * std::abs(slope) &&
+                            next.value <= now_.value + 1e-12 * now_.magnitude;
+      if (falls || flattens) {
+        y_ = y;
+        now_ = next;
+        return true;
+      }
+    }
+    return false;
+  }
+
+  const Directions& q_;
+  const Potential& potential_;
+  Vector<Real> y_;
+  Moments now_;
+};
+
+template <class Potential>
+NewtonSolution MinimizeIn(const Directions& q, const Potential& potential,
+                          const WideVec3& start) {
+  const NewtonSolution plain =
+      Descent<Potential, double>(q, potential, start.cast<double>()).Run();
+  if (plain.separated() || plain.residual <= kWideResidual) return plain;
+  NewtonSolution wide =
+      Descent<Potential, long double>(q, potential, plain.y).Run();
+  wide.iterations += plain.iterations;
+  return wide;
+}
+
+}  // namespace
+
+void Directions::Resize(int64_t n) {
+  for (auto* v : {&x, &y, &z, &distance}) v->resize(static_cast<size_t>(n));
+}
+
+bool Directions::Set(int64_t i, const Vec3& offset) {
+  // Scaling by a power of two keeps squares in range and digits as they are.
+  const double largest = offset.cwiseAbs().maxCoeff();
+  const double scale = largest > 0 ? std::exp2(std::ilogb(largest)) : 1;
+  const Vec3 scaled = offset / scale;
+  const double length = scaled.norm();
+  const Vec3 unit = scaled / length;
+  x[i] = unit.x();
+  y[i] = unit.y();
+  z[i] = unit.z();
+  distance[i] = length * scale;
+  return distance[i] > 0;
+}
+
+NewtonSolution Minimize(const Directions& directions,
+                        const ExponentialPotential& potential,
+                        const WideVec3& start) {
+  return MinimizeIn(directions, potential, start);
+}
+
+NewtonSolution Minimize(const Directions& directions,
+                        const AsinhPotential& potential,
+                        const WideVec3& start) {
+  return MinimizeIn(directions, potential, start);
+}
+
+}  // namespace deform

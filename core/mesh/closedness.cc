@@ -153,28 +153,26 @@ absl::Status CheckSurface(const Faces& faces, int64_t vertices,
   return CheckFans(faces, sides, vertices, field);
 }
 
-absl::Status CheckLoops(const Faces& faces, int64_t vertices,
-                        absl::string_view field) {
-  std::vector<std::vector<int32_t>> edges(vertices);
-  for (int32_t f = 0; f < faces.rows(); ++f) {
-    edges[faces(f, 0)].push_back(f);
-    edges[faces(f, 1)].push_back(f);
+// The edges at each vertex.
+std::vector<std::vector<int32_t>> EdgesAtVertices(const Faces& edges,
+                                                  int64_t vertices) {
+  std::vector<std::vector<int32_t>> at(vertices);
+  for (int32_t e = 0; e < edges.rows(); ++e) {
+    at[edges(e, 0)].push_back(e);
+    at[edges(e, 1)].push_back(e);
   }
+  return at;
+}
+
+absl::Status CheckLoops(const Faces& edges, int64_t vertices,
+                        absl::string_view field) {
+  DEFORM_RETURN_IF_ERROR(CheckLoopsEitherWay(edges, vertices, field));
+  const auto edges_at = EdgesAtVertices(edges, vertices);
   for (int64_t v = 0; v < vertices; ++v) {
-    const std::vector<int32_t>& at = edges[v];
+    const std::vector<int32_t>& at = edges_at[v];
     if (at.empty()) continue;
-    if (at.size() == 1) {
-      return InvalidInput("CAGE_NOT_CLOSED", field,
-                          absl::StrCat("vertex ", v, " belongs to edge ", at[0],
-                                       " only: the loop is not closed there"));
-    }
-    if (at.size() > 2) {
-      return InvalidInput("CAGE_NOT_MANIFOLD", field,
-                          absl::StrCat("vertex ", v, " belongs to ", at.size(),
-                                       " edges: ", ListOf(at)));
-    }
-    const bool starts = faces(at[0], 0) == v;
-    if (starts == (faces(at[1], 0) == v)) {
+    const bool starts = edges(at[0], 0) == v;
+    if (starts == (edges(at[1], 0) == v)) {
       return InvalidInput(
           "CAGE_INCONSISTENT_ORIENTATION", field,
           absl::StrCat("edges ", at[0], " and ", at[1], " both ",
@@ -191,6 +189,25 @@ absl::Status CheckClosed(const Faces& faces, int64_t vertices,
                          absl::string_view field) {
   return faces.cols() == 2 ? CheckLoops(faces, vertices, field)
                            : CheckSurface(faces, vertices, field);
+}
+
+absl::Status CheckLoopsEitherWay(const Faces& edges, int64_t vertices,
+                                 absl::string_view field) {
+  const auto edges_at = EdgesAtVertices(edges, vertices);
+  for (int64_t v = 0; v < vertices; ++v) {
+    const std::vector<int32_t>& at = edges_at[v];
+    if (at.size() == 1) {
+      return InvalidInput("CAGE_NOT_CLOSED", field,
+                          absl::StrCat("vertex ", v, " belongs to edge ", at[0],
+                                       " only: the loop is not closed there"));
+    }
+    if (at.size() > 2) {
+      return InvalidInput("CAGE_NOT_MANIFOLD", field,
+                          absl::StrCat("vertex ", v, " belongs to ", at.size(),
+                                       " edges: ", ListOf(at)));
+    }
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace deform

@@ -16,4 +16,9 @@ namespace deform {
 absl::Status CheckClosed(const Faces& faces, int64_t vertices,
                          absl::string_view field);
 
+// The same for edges that may still be turned: CAGE_NOT_CLOSED and
+// CAGE_NOT_MANIFOLD only. `edges` is E x 2.
+absl::Status CheckLoopsEitherWay(const Faces& edges, int64_t vertices,
+                                 absl::string_view field);
+
 }  // namespace deform

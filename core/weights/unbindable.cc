@@ -35,7 +35,7 @@ constexpr Reason kReasons[] = {
      "add handles around them, or bind without user weights"},
     {kWeightTooLarge, "is so far outside that float cannot hold its weights",
      "are so far outside that float cannot hold their weights",
-     "move them closer to the cage"},
+     "move the model closer to the cage"},
 };
 
 std::string Describe(const Reason& reason, std::vector<int64_t> points,

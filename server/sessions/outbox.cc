@@ -1,0 +1,65 @@
+#include "server/sessions/outbox.h"
+
+#include <cassert>
+#include <utility>
+
+namespace deform::server {
+
+void Outbox::Offer(std::shared_ptr<const Frame> frame, uint64_t answers) {
+  assert(!full());
+  if (delivery_ == Delivery::kLatest) frames_.clear();
+  frames_.push_back({std::move(frame), answers});
+}
+
+bool Outbox::full() const {
+  return delivery_ == Delivery::kEvery && frames_.size() >= kMaxFrames;
+}
+
+void Outbox::Reject(uint64_t sequence, absl::Status status) {
+  assert(has_room_for_rejections());
+  rejections_.push_back({sequence, std::move(status)});
+}
+
+void Outbox::EndWhenAnswered(absl::Status status) {
+  if (!end_) end_ = std::move(status);
+}
+
+void Outbox::EndNow(absl::Status status) {
+  frames_.clear();
+  rejections_.clear();
+  end_ = std::move(status);
+  sent_any_ = true;
+  answered_ = expected_;
+}
+
+std::optional<Outgoing> Outbox::Take() {
+  if (ended_) return std::nullopt;
+  if (!rejections_.empty()) {
+    Rejection rejection = std::move(rejections_.front());
+    rejections_.pop_front();
+    return rejection;
+  }
+  if (end_ && Answered()) {
+    ended_ = true;
+    frames_.clear();
+    return Ended{*end_};
+  }
+  if (frames_.empty()) return std::nullopt;
+  return TakeFrame();
+}
+
+FrameToSend Outbox::TakeFrame() {
+  const Waiting waiting = std::move(frames_.front());
+  frames_.pop_front();
+  const FrameInfo& info = waiting.frame->info;
+  FrameToSend send{.frame = waiting.frame, .answers_sequence = waiting.answers};
+  if (sent_any_) send.skipped_revisions = info.revision - revision_ - 1;
+  send.keyframe = !sent_any_ || info.origin_number != origin_number_;
+  sent_any_ = true;
+  answered_ = waiting.answers;
+  revision_ = info.revision;
+  origin_number_ = info.origin_number;
+  return send;
+}
+
+}  // namespace deform::server

@@ -1,0 +1,96 @@
+// What waits to be sent to one participant.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <variant>
+
+#include "absl/status/status.h"
+#include "server/sessions/frame.h"
+
+namespace deform::server {
+
+// Which frames a participant gets.
+enum class Delivery {
+  // The newest, whenever there is room.
+  kLatest,
+  // All, in order; while its queue is full the session waits.
+  kEvery,
+};
+
+// A frame with what its header says to this receiver.
+struct FrameToSend {
+  std::shared_ptr<const Frame> frame;
+  uint64_t answers_sequence = 0;
+  uint64_t skipped_revisions = 0;
+  bool keyframe = false;
+};
+struct Rejection {
+  uint64_t sequence = 0;
+  absl::Status status;
+};
+// The stream ends; OK: because the participant has finished.
+struct Ended {
+  absl::Status status;
+};
+using Outgoing = std::variant<FrameToSend, Rejection, Ended>;
+
+// Not thread-safe; never holds more than a few frames and rejections.
+class Outbox {
+ public:
+  static constexpr size_t kMaxFrames = 4;
+  static constexpr size_t kMaxRejections = 16;
+
+  explicit Outbox(Delivery delivery) : delivery_(delivery) {}
+
+  Delivery delivery() const { return delivery_; }
+
+  // `answers` is the participant's newest pose in this frame; never falls.
+  // Needs !full().
+  void Offer(std::shared_ptr<const Frame> frame, uint64_t answers);
+  // The next frame must wait until one is taken. Only with kEvery.
+  bool full() const;
+
+  // The pose `sequence` was accepted: a frame will answer it.
+  void Expect(uint64_t sequence) { expected_ = sequence; }
+  // Needs room for rejections.
+  void Reject(uint64_t sequence, absl::Status status);
+  bool has_room_for_rejections() const {
+    return rejections_.size() < kMaxRejections;
+  }
+
+  // Ends with `status` after what was asked so far is answered. The first of
+  // these calls decides.
+  void EndWhenAnswered(absl::Status status);
+  // Ends with `status` now; what waits is dropped.
+  void EndNow(absl::Status status);
+
+  // The next to be sent. After Ended there is nothing.
+  std::optional<Outgoing> Take();
+
+ private:
+  struct Waiting {
+    std::shared_ptr<const Frame> frame;
+    uint64_t answers;
+  };
+
+  FrameToSend TakeFrame();
+  bool Answered() const { return sent_any_ && answered_ >= expected_; }
+
+  const Delivery delivery_;
+  std::deque<Waiting> frames_;
+  std::deque<Rejection> rejections_;
+  std::optional<absl::Status> end_;
+  bool ended_ = false;
+
+  uint64_t expected_ = 0;
+  // As of the frame taken last.
+  uint64_t answered_ = 0;
+  uint64_t revision_ = 0;
+  uint64_t origin_number_ = 0;
+  bool sent_any_ = false;
+};
+
+}  // namespace deform::server

@@ -1,0 +1,42 @@
+#include "server/sessions/pose_queue.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace deform::server {
+
+void PoseQueue::Push(const Answer& answer, const PoseUpdate& update,
+                     bool own_revision) {
+  if (own_revision || steps_.empty() || steps_.back().own_revision) {
+    const Pose& before = steps_.empty() ? pose_ : steps_.back().pose;
+    steps_.push_back(
+        {.pose = before, .answers = {}, .own_revision = own_revision});
+  }
+  Step& step = steps_.back();
+  ApplyPoseUpdate(update, step.pose);
+  const auto answered = std::find_if(
+      step.answers.begin(), step.answers.end(), [&](const Answer& other) {
+        return other.participant == answer.participant;
+      });
+  if (answered == step.answers.end()) {
+    step.answers.push_back(answer);
+  } else {
+    answered->sequence = answer.sequence;
+  }
+}
+
+std::optional<PoseQueue::Step> PoseQueue::Pop() {
+  if (steps_.empty()) return std::nullopt;
+  Step step = std::move(steps_.front());
+  steps_.pop_front();
+  if (steps_.empty()) pose_ = step.pose;
+  return step;
+}
+
+int64_t PoseQueue::OwnStepsOf(int64_t participant) const {
+  return std::count_if(steps_.begin(), steps_.end(), [&](const Step& step) {
+    return step.own_revision && step.answers[0].participant == participant;
+  });
+}
+
+}  // namespace deform::server

@@ -1,0 +1,204 @@
+// One binding being posed by any number of participants.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/time/time.h"
+#include "core/base/mutex.h"
+#include "core/base/thread_pool.h"
+#include "core/deform/deformer.h"
+#include "core/frames/encoding.h"
+#include "server/models/binding_registry.h"
+#include "server/sessions/frame.h"
+#include "server/sessions/outbox.h"
+#include "server/sessions/pose_queue.h"
+
+namespace deform::server {
+
+class Session;
+
+// Never goes back; tests pass their own.
+using Clock = std::function<std::chrono::steady_clock::time_point()>;
+// Runs a task soon, on some thread.
+using Executor = std::function<void(std::function<void()>)>;
+
+// Where a participant's frames go: the other end of a stream. Called on any
+// thread, with no lock of the session held; must not block.
+class Receiver {
+ public:
+  virtual ~Receiver() = default;
+  // There may be something to take, or room for poses again.
+  virtual void Wake() = 0;
+  // Has made no progress for too long and is out of the session: end the
+  // stream without waiting for what it is sending.
+  virtual void Abandon(const absl::Status& status) = 0;
+};
+
+// What all sessions of a server share. The pool is borrowed.
+struct SessionEnvironment {
+  Executor executor;           // Runs steps; never inside the call.
+  ThreadPool* pool = nullptr;  // Splits the work of a step; may be null.
+  Clock clock;
+  int max_participants = 64;
+  // How long a receiver may take to send one message.
+  std::chrono::milliseconds stall_timeout{10000};
+};
+
+// A session as others see it.
+struct SessionState {
+  std::string tenant;
+  std::string id;
+  std::string binding_id;
+  uint64_t revision = 0;
+  uint64_t epoch = 1;
+  int participants = 0;
+  absl::Time create_time;
+};
+
+// A place in a session. Leaves when it goes. Thread-safe.
+class Participant {
+ public:
+  ~Participant();
+  Participant(const Participant&) = delete;
+  Participant& operator=(const Participant&) = delete;
+
+  const Session& session() const { return *session_; }
+
+  // Accepts the pose, or puts a rejection into the outbox. Rejected are, beside
+  // an `update` that is a status, what CheckPoseUpdate() refuses and
+  // InvalidArgument SEQUENCE_NOT_RISING. Needs WantsPoses().
+  void Submit(uint64_t sequence, const absl::StatusOr<PoseUpdate>& update);
+  // False while as many of its poses or rejections wait as may. The receiver
+  // is woken when that changes.
+  bool WantsPoses() const;
+  // No more poses come; the stream ends OK once those that came are answered.
+  void HalfClose();
+
+  // The next to be sent; what was taken before has been sent. Nothing: the
+  // receiver will be woken.
+  std::optional<Outgoing> Take();
+  // Part of what was taken has been sent.
+  void Progressed();
+  // Gives up the place. Others no longer wait for it.
+  void Leave();
+
+ private:
+  friend class Session;
+  Participant(std::shared_ptr<Session> session, int64_t seat)
+      : session_(std::move(session)), seat_(seat) {}
+
+  const std::shared_ptr<Session> session_;
+  const int64_t seat_;
+};
+
+// Poses merge into a queue of steps; a step is run by the executor, one at a
+// time: the deformer moves, the revision rises, the frame is encoded once per
+// encoding in use and offered to every participant. Thread-safe; the lock is
+// never held while deforming or encoding.
+class Session : public std::enable_shared_from_this<Session> {
+ public:
+  // A participant's poses that may wait with Delivery::kEvery.
+  static constexpr int64_t kMaxOwnSteps = 4;
+
+  // Starts at the rest pose, revision 0.
+  static std::shared_ptr<Session> Create(std::string id,
+                                         BindingCatalogue::Lease binding,
+                                         MemoryBudget::Reservation memory,
+                                         const SessionEnvironment& environment);
+
+  const std::string& id() const { return id_; }
+  const std::string& binding_id() const { return binding_id_; }
+  const Binding& binding() const { return deformer_.binding(); }
+  SessionState state() const;
+
+  struct Joined {
+    std::unique_ptr<Participant> participant;
+    SessionState state;
+    Pose pose;
+  };
+  // A frame of the present state follows. ResourceExhausted
+  // TOO_MANY_PARTICIPANTS; after End() or Drain() their status.
+  absl::StatusOr<Joined> Join(Delivery delivery, const FrameEncoding& encoding,
+                              std::weak_ptr<Receiver> receiver);
+
+  // Ends every stream with `status` and lets the binding go.
+  void End(const absl::Status& status);
+  // Takes no more poses; ends every stream with `status` once the poses that
+  // came are answered.
+  void Drain(const absl::Status& status);
+  // Abandons the receivers that have been sending one message for longer than
+  // the stall timeout.
+  void CheckStalls();
+
+  // Memory of a session of `binding`, roughly.
+  static int64_t BytesFor(const Binding& binding);
+
+ private:
+  friend class Participant;
+  using TimePoint = std::chrono::steady_clock::time_point;
+  using Frames = std::map<const FrameEncoding*, std::shared_ptr<const Frame>>;
+  using Receivers = std::vector<std::weak_ptr<Receiver>>;
+
+  struct Seat {
+    Outbox outbox;
+    const FrameEncoding* encoding = nullptr;
+    std::weak_ptr<Receiver> receiver;
+    uint64_t last_sequence = 0;  // Of the poses accepted.
+    uint64_t contained = 0;      // Newest pose that the revision contains.
+    bool needs_frame = false;    // Has no frame of the revision to come.
+    std::optional<TimePoint> sending_since;
+  };
+
+  Session(std::string id, BindingCatalogue::Lease binding,
+          MemoryBudget::Reservation memory,
+          const SessionEnvironment& environment);
+
+  SessionState StateLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::Status CheckPose(const Seat& seat, uint64_t sequence,
+                         const absl::StatusOr<PoseUpdate>& update) const;
+  bool CanStep() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Schedule() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  Receivers ReceiversLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
+  // The step, in its three parts.
+  void Run();
+  std::optional<PoseQueue::Step> BeginStep(
+      std::vector<const FrameEncoding*>& encodings);
+  void MoveTo(const Pose& pose);
+  Receivers Publish(const std::optional<PoseQueue::Step>& step, Frames frames);
+
+  const std::string id_;
+  const std::string tenant_;
+  const std::string binding_id_;
+  const absl::Time create_time_;
+  const SessionEnvironment environment_;
+  const MemoryBudget::Reservation memory_;
+
+  // Used by the running step only; the queue of the executor hands them from
+  // one to the next.
+  Deformer deformer_;
+  FrameInfo info_;
+
+  mutable Mutex mutex_;
+  BindingCatalogue::Lease lease_ ABSL_GUARDED_BY(mutex_);
+  PoseQueue queue_ ABSL_GUARDED_BY(mutex_);
+  bool scheduled_ ABSL_GUARDED_BY(mutex_) = false;
+  uint64_t revision_ ABSL_GUARDED_BY(mutex_) = 0;
+  Pose pose_ ABSL_GUARDED_BY(mutex_);      // Of the revision.
+  Frames frames_ ABSL_GUARDED_BY(mutex_);  // Of the revision.
+  std::optional<absl::Status> closed_ ABSL_GUARDED_BY(mutex_);
+  std::map<int64_t, Seat> seats_ ABSL_GUARDED_BY(mutex_);
+  int64_t next_seat_ ABSL_GUARDED_BY(mutex_) = 1;
+};
+
+}  // namespace deform::server

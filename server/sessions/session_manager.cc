@@ -1,0 +1,96 @@
+#include "server/sessions/session_manager.h"
+
+#include <openssl/rand.h>
+
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+#include "core/base/error.h"
+#include "core/base/status_macros.h"
+
+namespace deform::server {
+namespace {
+
+// Nobody guesses it: 96 random bits.
+absl::StatusOr<std::string> RandomId() {
+  unsigned char bytes[12];
+  if (RAND_bytes(bytes, sizeof(bytes)) != 1) {
+    return absl::InternalError("no random numbers for a session id");
+  }
+  return absl::StrCat(
+      "s-", absl::BytesToHexString(absl::string_view(
+                reinterpret_cast<const char*>(bytes), sizeof(bytes))));
+}
+
+}  // namespace
+
+absl::Status Draining() {
+  return MakeError(absl::StatusCode::kUnavailable,
+                   "the server is shutting down: try another, or later",
+                   {.reason = "SERVER_DRAINING"});
+}
+
+SessionManager::~SessionManager() {
+  for (const auto& session : sessions_.All()) session->End(Draining());
+}
+
+absl::StatusOr<std::shared_ptr<Session>> SessionManager::Create(
+    const std::string& tenant, const std::string& binding_id,
+    const std::string& wanted_id) {
+  std::string id = wanted_id;
+  if (id.empty()) {
+    DEFORM_ASSIGN_OR_RETURN(id, RandomId());
+  }
+  DEFORM_RETURN_IF_ERROR(CheckName(id, "session_id"));
+  auto session = sessions_.Find(tenant, id);
+  if (!session.ok()) {
+    DEFORM_ASSIGN_OR_RETURN(
+        auto lease,
+        bindings_.Use(tenant, binding_id, absl::StrCat("session ", id)));
+    DEFORM_ASSIGN_OR_RETURN(
+        auto memory,
+        budget_.Reserve(Session::BytesFor(*lease.record()->binding),
+                        "the session needs"));
+    auto made =
+        Session::Create(id, std::move(lease), std::move(memory), environment_);
+    // Under the lock of Drain(): it then sees every session that was made.
+    MutexLock lock(mutex_);
+    if (draining_) return Draining();
+    DEFORM_ASSIGN_OR_RETURN(auto inserted,
+                            sessions_.Insert(tenant, id, std::move(made)));
+    session = std::move(inserted.first);
+  }
+  if ((*session)->binding_id() != binding_id) {
+    return MakeError(absl::StatusCode::kAlreadyExists,
+                     absl::StrCat("session ", Quoted(id), " has binding ",
+                                  Quoted((*session)->binding_id())),
+                     {.reason = "SESSION_EXISTS",
+                      .resource_type = "session",
+                      .resource_name = id});
+  }
+  return session;
+}
+
+absl::Status SessionManager::Delete(const std::string& tenant,
+                                    const std::string& id) {
+  DEFORM_ASSIGN_OR_RETURN(const auto session, sessions_.Remove(tenant, id));
+  session->End(MakeError(absl::StatusCode::kNotFound,
+                         absl::StrCat("session ", Quoted(id), " was deleted"),
+                         {.reason = "SESSION_DELETED",
+                          .resource_type = "session",
+                          .resource_name = id}));
+  return absl::OkStatus();
+}
+
+void SessionManager::Drain() {
+  {
+    MutexLock lock(mutex_);
+    draining_ = true;
+  }
+  for (const auto& session : sessions_.All()) session->Drain(Draining());
+}
+
+void SessionManager::CheckStalls() {
+  for (const auto& session : sessions_.All()) session->CheckStalls();
+}
+
+}  // namespace deform::server

@@ -1,0 +1,68 @@
+// The sessions of the server.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "server/models/binding_registry.h"
+#include "server/models/catalogue.h"
+#include "server/sessions/session.h"
+
+namespace deform::server {
+
+using SessionCatalogue = Catalogue<Session>;
+
+// Thread-safe.
+class SessionManager {
+ public:
+  struct Limits {
+    int64_t memory;  // Of all sessions.
+    int64_t count;
+  };
+
+  // Bindings are borrowed; so is what the environment points to.
+  SessionManager(BindingCatalogue& bindings, const Limits& limits,
+                 SessionEnvironment environment)
+      : environment_(std::move(environment)),
+        bindings_(bindings),
+        budget_(limits.memory, "max-sessions-memory"),
+        sessions_("session", limits.count, "max-sessions") {}
+  // Ends what is left.
+  ~SessionManager();
+
+  // `id` may be empty: one is made. The session that is there if it has the
+  // same binding, else AlreadyExists SESSION_EXISTS. NotFound
+  // BINDING_NOT_FOUND, InvalidArgument BAD_NAME, ResourceExhausted
+  // MEMORY_LIMIT, TOO_MANY_SESSIONS, Unavailable SERVER_DRAINING.
+  absl::StatusOr<std::shared_ptr<Session>> Create(const std::string& tenant,
+                                                  const std::string& binding_id,
+                                                  const std::string& id);
+
+  // Ends its streams with NotFound SESSION_DELETED.
+  absl::Status Delete(const std::string& tenant, const std::string& id);
+
+  // No new sessions or participants; streams end with Unavailable
+  // SERVER_DRAINING once the poses that came are answered.
+  void Drain();
+  // See Session::CheckStalls(); call it a few times a second.
+  void CheckStalls();
+
+  SessionCatalogue& catalogue() { return sessions_; }
+  const Clock& clock() const { return environment_.clock; }
+
+ private:
+  const SessionEnvironment environment_;
+  BindingCatalogue& bindings_;
+  MemoryBudget budget_;
+  SessionCatalogue sessions_;
+  mutable Mutex mutex_;
+  bool draining_ ABSL_GUARDED_BY(mutex_) = false;
+};
+
+// Unavailable SERVER_DRAINING.
+absl::Status Draining();
+
+}  // namespace deform::server

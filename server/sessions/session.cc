@@ -57,6 +57,7 @@ SessionState Session::StateLocked() const {
           .id = id_,
           .binding_id = binding_id_,
           .revision = revision_,
+          .epoch = epoch(),
           .participants = static_cast<int>(seats_.size()),
           .create_time = create_time_};
 }
@@ -118,34 +119,6 @@ void Session::Drain(const absl::Status& status) {
   }
 }
 
-void Session::CheckStalls() {
-  const TimePoint now = environment_.clock();
-  Receivers stalled;
-  {
-    MutexLock lock(mutex_);
-    for (auto it = seats_.begin(); it != seats_.end();) {
-      const Seat& seat = it->second;
-      if (seat.sending_since &&
-          now - *seat.sending_since > environment_.stall_timeout) {
-        stalled.push_back(seat.receiver);
-        it = seats_.erase(it);
-      } else {
-        ++it;
-      }
-    }
-    if (!stalled.empty()) Schedule();
-  }
-  const absl::Status status =
-      MakeError(absl::StatusCode::kAborted,
-                absl::StrCat("the stream took no frame for ",
-                             environment_.stall_timeout.count() / 1000.0,
-                             " s (stall-timeout): read faster, or join again"),
-                {.reason = "RECEIVER_STALLED", .field = "stall-timeout"});
-  for (const auto& weak : stalled) {
-    if (const auto receiver = weak.lock()) receiver->Abandon(status);
-  }
-}
-
 Session::Receivers Session::ReceiversLocked() const {
   Receivers receivers;
   for (const auto& [number, seat] : seats_) receivers.push_back(seat.receiver);
@@ -159,13 +132,14 @@ bool Session::CanStep() const {
          });
 }
 
+bool Session::NeedsFrame() const {
+  return std::any_of(seats_.begin(), seats_.end(), [](const auto& seat) {
+    return seat.second.needs_frame;
+  });
+}
+
 void Session::Schedule() {
-  if (scheduled_) return;
-  const bool wanted = CanStep() || std::any_of(seats_.begin(), seats_.end(),
-                                               [](const auto& seat) {
-                                                 return seat.second.needs_frame;
-                                               });
-  if (!wanted) return;
+  if (scheduled_ || !(CanStep() || NeedsFrame())) return;
   scheduled_ = true;
   environment_.executor([self = shared_from_this()] { self->Run(); });
 }
@@ -187,8 +161,9 @@ void Session::Run() {
 std::optional<PoseQueue::Step> Session::BeginStep(
     std::vector<const FrameEncoding*>& encodings) {
   MutexLock lock(mutex_);
+  // Who has joined sees the state as it was before anything newer.
   std::optional<PoseQueue::Step> step;
-  if (CanStep()) step = queue_.Pop();
+  if (CanStep() && !NeedsFrame()) step = queue_.Pop();
   for (const auto& [number, seat] : seats_) {
     if ((step || seat.needs_frame) &&
         std::find(encodings.begin(), encodings.end(), seat.encoding) ==
@@ -308,6 +283,24 @@ void Participant::Progressed() {
   const auto found = session_->seats_.find(seat_);
   if (found == session_->seats_.end()) return;
   found->second.sending_since = session_->environment_.clock();
+}
+
+absl::Status Participant::CheckStall() const {
+  const SessionEnvironment& environment = session_->environment_;
+  const auto now = environment.clock();
+  MutexLock lock(session_->mutex_);
+  const auto found = session_->seats_.find(seat_);
+  if (found == session_->seats_.end()) return absl::OkStatus();
+  const auto& since = found->second.sending_since;
+  if (!since || now - *since <= environment.stall_timeout) {
+    return absl::OkStatus();
+  }
+  return MakeError(
+      absl::StatusCode::kAborted,
+      absl::StrCat("the stream took no message for ",
+                   environment.stall_timeout.count() / 1000.0,
+                   " s (stall-timeout): read faster, or join again"),
+      {.reason = "RECEIVER_STALLED", .field = "stall-timeout"});
 }
 
 void Participant::Leave() {

@@ -39,9 +39,6 @@ class Receiver {
   virtual ~Receiver() = default;
   // There may be something to take, or room for poses again.
   virtual void Wake() = 0;
-  // Has made no progress for too long and is out of the session: end the
-  // stream without waiting for what it is sending.
-  virtual void Abandon(const absl::Status& status) = 0;
 };
 
 // What all sessions of a server share. The pool is borrowed.
@@ -60,7 +57,7 @@ struct SessionState {
   std::string id;
   std::string binding_id;
   uint64_t revision = 0;
-  uint64_t epoch = 1;
+  uint64_t epoch = 0;
   int participants = 0;
   absl::Time create_time;
 };
@@ -89,6 +86,9 @@ class Participant {
   std::optional<Outgoing> Take();
   // Part of what was taken has been sent.
   void Progressed();
+  // Aborted RECEIVER_STALLED if the same message has been under way for longer
+  // than the stall timeout: then it is to leave.
+  absl::Status CheckStall() const;
   // Gives up the place. Others no longer wait for it.
   void Leave();
 
@@ -117,6 +117,8 @@ class Session : public std::enable_shared_from_this<Session> {
                                          const SessionEnvironment& environment);
 
   const std::string& id() const { return id_; }
+  // Raised by every server that takes the session over.
+  uint64_t epoch() const { return 1; }
   const std::string& binding_id() const { return binding_id_; }
   const Binding& binding() const { return deformer_.binding(); }
   SessionState state() const;
@@ -136,9 +138,6 @@ class Session : public std::enable_shared_from_this<Session> {
   // Takes no more poses; ends every stream with `status` once the poses that
   // came are answered.
   void Drain(const absl::Status& status);
-  // Abandons the receivers that have been sending one message for longer than
-  // the stall timeout.
-  void CheckStalls();
 
   // Memory of a session of `binding`, roughly.
   static int64_t BytesFor(const Binding& binding);
@@ -167,6 +166,7 @@ class Session : public std::enable_shared_from_this<Session> {
   absl::Status CheckPose(const Seat& seat, uint64_t sequence,
                          const absl::StatusOr<PoseUpdate>& update) const;
   bool CanStep() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool NeedsFrame() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Schedule() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   Receivers ReceiversLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 

@@ -89,8 +89,4 @@ void SessionManager::Drain() {
   for (const auto& session : sessions_.All()) session->Drain(Draining());
 }
 
-void SessionManager::CheckStalls() {
-  for (const auto& session : sessions_.All()) session->CheckStalls();
-}
-
 }  // namespace deform::server

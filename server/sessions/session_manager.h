@@ -47,8 +47,6 @@ class SessionManager {
   // No new sessions or participants; streams end with Unavailable
   // SERVER_DRAINING once the poses that came are answered.
   void Drain();
-  // See Session::CheckStalls(); call it a few times a second.
-  void CheckStalls();
 
   SessionCatalogue& catalogue() { return sessions_; }
   const Clock& clock() const { return environment_.clock; }

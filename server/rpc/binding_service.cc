@@ -1,0 +1,178 @@
+#include "server/rpc/binding_service.h"
+
+#include <algorithm>
+#include <future>
+#include <utility>
+
+#include "core/base/status_macros.h"
+#include "core/weights/scheme.h"
+#include "server/rpc/convert.h"
+#include "server/rpc/weight_rows.h"
+
+namespace deform::server {
+namespace {
+
+// Between two looks at whether the caller is still there; a progress message is
+// sent as often if there is progress.
+constexpr std::chrono::milliseconds kProgressInterval{200};
+
+// A computation is stopped within a tile of the caller's leaving, which is
+// looked for as often as this.
+constexpr std::chrono::milliseconds kPollInterval{20};
+
+using BindingWriter = grpc::ServerWriter<v1::CreateBindingResponse>;
+
+bool WriteProgress(const BindProgress& progress, BindingWriter& writer) {
+  v1::CreateBindingResponse message;
+  message.mutable_progress()->set_points_done(progress.points_done);
+  message.mutable_progress()->set_points_total(progress.points_total);
+  return writer.Write(message);
+}
+
+// Waits for the binding, telling progress.
+absl::StatusOr<CreatedBinding> Await(BindingRegistry::Waiter& waiter,
+                                     grpc::ServerContext& context,
+                                     CallRunner::Watch& watch,
+                                     BindingWriter& writer) {
+  int64_t told = -1;
+  auto told_at = std::chrono::steady_clock::now() - kProgressInterval;
+  for (;;) {
+    if (auto outcome = waiter.Wait(kPollInterval)) return *std::move(outcome);
+    if (context.IsCancelled()) return absl::CancelledError();
+    watch.Progressed();
+    const auto now = std::chrono::steady_clock::now();
+    const BindProgress progress = waiter.progress();
+    if (progress.points_done == told || now - told_at < kProgressInterval) {
+      continue;
+    }
+    if (!WriteProgress(progress, writer)) return absl::CancelledError();
+    told = progress.points_done;
+    told_at = now;
+  }
+}
+
+// The rows of `range`. Computing them again takes the priority of `pool`.
+absl::StatusOr<v1::GetWeightsResponse> Rows(const Binding& binding,
+                                            const PointRange& range,
+                                            v1::WeightPrecision precision,
+                                            ThreadPool& pool) {
+  if (precision != v1::WEIGHT_PRECISION_RECOMPUTED_FLOAT64) {
+    return CachedRows(binding, range);
+  }
+  std::packaged_task<absl::StatusOr<v1::GetWeightsResponse>()> task(
+      [&] { return RecomputedRows(binding, range); });
+  auto rows = task.get_future();
+  pool.Submit([&] { task(); });
+  return rows.get();
+}
+
+}  // namespace
+
+grpc::Status BindingService::CreateBinding(
+    grpc::ServerContext* context, const v1::CreateBindingRequest* request,
+    BindingWriter* writer) {
+  return calls_.Run("CreateBinding", *context, [&]() -> absl::Status {
+    CallRunner::Watch watch(calls_, *context);
+    DEFORM_ASSIGN_OR_RETURN(BindSpec spec, FromProto(*request));
+    DEFORM_ASSIGN_OR_RETURN(const auto waiter,
+                            bindings_.Create(std::move(spec)));
+    DEFORM_ASSIGN_OR_RETURN(const CreatedBinding created,
+                            Await(*waiter, *context, watch, *writer));
+    v1::CreateBindingResponse message;
+    ToProto(*created.record, Detail::kFull, message.mutable_binding());
+    message.mutable_binding()->set_existed(created.existed);
+    writer->Write(message);
+    return absl::OkStatus();
+  });
+}
+
+grpc::Status BindingService::GetBinding(grpc::ServerContext* context,
+                                        const v1::GetBindingRequest* request,
+                                        v1::GetBindingResponse* response) {
+  return calls_.Run("GetBinding", *context, [&]() -> absl::Status {
+    DEFORM_ASSIGN_OR_RETURN(const std::string tenant,
+                            TenantOr(request->tenant()));
+    DEFORM_ASSIGN_OR_RETURN(
+        const auto record,
+        bindings_.catalogue().Find(tenant, request->binding_id()));
+    ToProto(*record, Detail::kFull, response->mutable_binding());
+    if (request->with_rig()) {
+      ToProto(record->binding->rig(), response->mutable_rig());
+    }
+    return absl::OkStatus();
+  });
+}
+
+grpc::Status BindingService::ListBindings(
+    grpc::ServerContext* context, const v1::ListBindingsRequest* request,
+    v1::ListBindingsResponse* response) {
+  return calls_.Run("ListBindings", *context, [&]() -> absl::Status {
+    DEFORM_ASSIGN_OR_RETURN(const std::string tenant,
+                            TenantOr(request->tenant()));
+    DEFORM_ASSIGN_OR_RETURN(
+        const PageRequest wanted,
+        ToPageRequest(request->page_size(), request->page_token()));
+    const auto page = bindings_.catalogue().List(
+        tenant, wanted, [&](const BindingRecord& record) {
+          return request->model_id().empty() ||
+                 record.model_id == request->model_id();
+        });
+    for (const auto& record : page.records) {
+      ToProto(*record, Detail::kSummary, response->add_bindings());
+    }
+    response->set_next_page_token(page.next);
+    return absl::OkStatus();
+  });
+}
+
+grpc::Status BindingService::DeleteBinding(
+    grpc::ServerContext* context, const v1::DeleteBindingRequest* request,
+    v1::DeleteBindingResponse* /*response*/) {
+  return calls_.Run("DeleteBinding", *context, [&]() -> absl::Status {
+    DEFORM_ASSIGN_OR_RETURN(const std::string tenant,
+                            TenantOr(request->tenant()));
+    return bindings_.catalogue().Remove(tenant, request->binding_id()).status();
+  });
+}
+
+grpc::Status BindingService::GetWeights(
+    grpc::ServerContext* context, const v1::GetWeightsRequest* request,
+    grpc::ServerWriter<v1::GetWeightsResponse>* writer) {
+  return calls_.Run("GetWeights", *context, [&]() -> absl::Status {
+    CallRunner::Watch watch(calls_, *context);
+    DEFORM_ASSIGN_OR_RETURN(const std::string tenant,
+                            TenantOr(request->tenant()));
+    DEFORM_ASSIGN_OR_RETURN(
+        const auto record,
+        bindings_.catalogue().Find(tenant, request->binding_id()));
+    const Binding& binding = *record->binding;
+    DEFORM_ASSIGN_OR_RETURN(PointRange left, WantedPoints(*request, binding));
+    const int64_t at_once = PointsPerMessage(binding, request->precision());
+    while (left.count > 0) {
+      if (context->IsCancelled()) return absl::CancelledError();
+      const PointRange block{left.first, std::min(at_once, left.count)};
+      DEFORM_ASSIGN_OR_RETURN(
+          const v1::GetWeightsResponse rows,
+          Rows(binding, block, request->precision(), background_));
+      watch.Progressed();
+      if (!writer->Write(rows)) return absl::CancelledError();
+      watch.Progressed();
+      left.first += block.count;
+      left.count -= block.count;
+    }
+    return absl::OkStatus();
+  });
+}
+
+grpc::Status BindingService::ListSchemes(
+    grpc::ServerContext* context, const v1::ListSchemesRequest* /*request*/,
+    v1::ListSchemesResponse* response) {
+  return calls_.Run("ListSchemes", *context, [&]() -> absl::Status {
+    for (const CoordinateScheme* scheme : AllSchemes()) {
+      ToProto(*scheme, response->add_schemes());
+    }
+    return absl::OkStatus();
+  });
+}
+
+}  // namespace deform::server

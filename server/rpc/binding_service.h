@@ -1,0 +1,43 @@
+// deform.v1.BindingService over the registry of bindings.
+#pragma once
+
+#include "core/base/thread_pool.h"
+#include "deform/v1/binding.grpc.pb.h"
+#include "server/models/binding_registry.h"
+#include "server/rpc/calls.h"
+
+namespace deform::server {
+
+class BindingService final : public v1::BindingService::Service {
+ public:
+  // All are borrowed. `background` recomputes weights.
+  BindingService(CallRunner& calls, BindingRegistry& bindings,
+                 ThreadPool& background)
+      : calls_(calls), bindings_(bindings), background_(background) {}
+
+  grpc::Status CreateBinding(
+      grpc::ServerContext* context, const v1::CreateBindingRequest* request,
+      grpc::ServerWriter<v1::CreateBindingResponse>* writer) override;
+  grpc::Status GetBinding(grpc::ServerContext* context,
+                          const v1::GetBindingRequest* request,
+                          v1::GetBindingResponse* response) override;
+  grpc::Status ListBindings(grpc::ServerContext* context,
+                            const v1::ListBindingsRequest* request,
+                            v1::ListBindingsResponse* response) override;
+  grpc::Status DeleteBinding(grpc::ServerContext* context,
+                             const v1::DeleteBindingRequest* request,
+                             v1::DeleteBindingResponse* response) override;
+  grpc::Status GetWeights(
+      grpc::ServerContext* context, const v1::GetWeightsRequest* request,
+      grpc::ServerWriter<v1::GetWeightsResponse>* writer) override;
+  grpc::Status ListSchemes(grpc::ServerContext* context,
+                           const v1::ListSchemesRequest* request,
+                           v1::ListSchemesResponse* response) override;
+
+ private:
+  CallRunner& calls_;
+  BindingRegistry& bindings_;
+  ThreadPool& background_;
+};
+
+}  // namespace deform::server

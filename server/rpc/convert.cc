@@ -1,0 +1,349 @@
+#include "server/rpc/convert.h"
+
+#include <limits>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "core/base/error.h"
+#include "core/base/status_macros.h"
+#include "core/frames/encoding.h"
+
+namespace deform::server {
+namespace {
+
+constexpr int kMaxEncodings = 16;
+
+using Doubles = google::protobuf::RepeatedField<double>;
+using Indices = google::protobuf::RepeatedField<uint32_t>;
+
+absl::Status CheckDimension(uint32_t dimension, absl::string_view field) {
+  if (dimension == 2 || dimension == 3) return absl::OkStatus();
+  return InvalidInput(
+      "BAD_DIMENSION", field,
+      absl::StrCat("dimension must be 2 or 3, not ", dimension));
+}
+
+absl::Status CheckLength(int64_t length, int dimension,
+                         absl::string_view field) {
+  if (length % dimension == 0) return absl::OkStatus();
+  return InvalidInput(
+      "WRONG_LENGTH", field,
+      absl::StrCat(field, " has ", length, " numbers, which is no multiple of ",
+                   dimension));
+}
+
+// Rows of `dimension` numbers; the third column is 0 in 2D.
+absl::StatusOr<Positions> ToPositions(const Doubles& numbers, int dimension,
+                                      absl::string_view field) {
+  DEFORM_RETURN_IF_ERROR(CheckLength(numbers.size(), dimension, field));
+  Positions positions = Positions::Zero(numbers.size() / dimension, 3);
+  positions.leftCols(dimension) =
+      Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic,
+                                     Eigen::RowMajor>>(
+          numbers.data(), positions.rows(), dimension);
+  return positions;
+}
+
+absl::StatusOr<int32_t> ToIndex(uint32_t index, absl::string_view field,
+                                int64_t entry) {
+  if (index <= static_cast<uint32_t>(std::numeric_limits<int32_t>::max())) {
+    return static_cast<int32_t>(index);
+  }
+  return InvalidInput("INDEX_OUT_OF_RANGE", field,
+                      absl::StrCat(field, " entry ", entry, " is ", index,
+                                   ", beyond every vertex and face"));
+}
+
+absl::StatusOr<Faces> ToFaces(const Indices& corners, int dimension,
+                              absl::string_view field) {
+  DEFORM_RETURN_IF_ERROR(CheckLength(corners.size(), dimension, field));
+  Faces faces(corners.size() / dimension, dimension);
+  for (int64_t i = 0; i < corners.size(); ++i) {
+    DEFORM_ASSIGN_OR_RETURN(faces.data()[i], ToIndex(corners[i], field, i));
+  }
+  return faces;
+}
+
+absl::StatusOr<std::vector<int32_t>> ToIndices(const Indices& indices,
+                                               absl::string_view field) {
+  std::vector<int32_t> result(indices.size());
+  for (int i = 0; i < indices.size(); ++i) {
+    DEFORM_ASSIGN_OR_RETURN(result[i], ToIndex(indices[i], field, i));
+  }
+  return result;
+}
+
+absl::StatusOr<Rig> ToRig(const v1::Cage& cage, bool flip) {
+  DEFORM_RETURN_IF_ERROR(
+      CheckDimension(cage.dimension(), "rig.cage.dimension"));
+  const int dimension = static_cast<int>(cage.dimension());
+  DEFORM_ASSIGN_OR_RETURN(
+      Positions vertices,
+      ToPositions(cage.vertices(), dimension, "rig.cage.vertices"));
+  DEFORM_ASSIGN_OR_RETURN(
+      Faces faces, ToFaces(cage.corners(), dimension, "rig.cage.corners"));
+  DEFORM_ASSIGN_OR_RETURN(
+      Cage made, Cage::Create(dimension, std::move(vertices), std::move(faces),
+                              flip ? Cage::Orientation::kFlipIfInsideOut
+                                   : Cage::Orientation::kAsGiven));
+  return Rig(std::move(made));
+}
+
+absl::StatusOr<Rig> ToRig(const v1::Handles& handles) {
+  DEFORM_RETURN_IF_ERROR(
+      CheckDimension(handles.dimension(), "rig.handles.dimension"));
+  const int dimension = static_cast<int>(handles.dimension());
+  DEFORM_ASSIGN_OR_RETURN(
+      Positions positions,
+      ToPositions(handles.positions(), dimension, "rig.handles.positions"));
+  DEFORM_ASSIGN_OR_RETURN(Handles made,
+                          Handles::Create(dimension, std::move(positions)));
+  return Rig(std::move(made));
+}
+
+absl::StatusOr<Rig> ToRig(const v1::Rig& rig, bool flip) {
+  switch (rig.kind_case()) {
+    case v1::Rig::kCage:
+      return ToRig(rig.cage(), flip);
+    case v1::Rig::kHandles:
+      return ToRig(rig.handles());
+    case v1::Rig::KIND_NOT_SET:
+      break;
+  }
+  return InvalidInput("MISSING_FIELD", "rig", "rig is a cage or handles");
+}
+
+absl::StatusOr<ExitRegions> ToExitRegions(const v1::ExitRegions& exits) {
+  ExitRegions regions;
+  switch (exits.choice_case()) {
+    case v1::ExitRegions::kAutomatic:
+      regions.kind = ExitRegions::Kind::kAutomatic;
+      break;
+    case v1::ExitRegions::kFaces: {
+      regions.kind = ExitRegions::Kind::kFaces;
+      DEFORM_ASSIGN_OR_RETURN(
+          regions.faces, ToIndices(exits.faces().faces(), "exits.faces.faces"));
+      break;
+    }
+    case v1::ExitRegions::kPerPoint:
+      regions.kind = ExitRegions::Kind::kPerPoint;
+      regions.face_of_point.assign(exits.per_point().faces().begin(),
+                                   exits.per_point().faces().end());
+      break;
+    case v1::ExitRegions::CHOICE_NOT_SET:
+      break;
+  }
+  return regions;
+}
+
+absl::Status UnknownValue(absl::string_view field, int value) {
+  return InvalidInput("UNKNOWN_VALUE", field,
+                      absl::StrCat(field, " ", value, " is not known"));
+}
+
+void ToProto(absl::Time time, google::protobuf::Timestamp* out) {
+  const int64_t nanos = absl::ToUnixNanos(time);
+  out->set_seconds(nanos / 1'000'000'000);
+  out->set_nanos(static_cast<int32_t>(nanos % 1'000'000'000));
+}
+
+template <typename Out>
+void AddRows(const Positions& positions, int dimension, Out* out) {
+  out->Reserve(static_cast<int>(positions.rows()) * dimension);
+  for (int64_t i = 0; i < positions.rows(); ++i) {
+    for (int c = 0; c < dimension; ++c)
+      out->AddAlreadyReserved(positions(i, c));
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<PageRequest> ToPageRequest(uint32_t page_size,
+                                          const std::string& page_token) {
+  if (page_size > kMaxPageSize) {
+    return InvalidInput("PAGE_TOO_LARGE", "page_size",
+                        absl::StrCat("page_size is at most ", kMaxPageSize,
+                                     ", not ", page_size));
+  }
+  if (!page_token.empty() && !CheckName(page_token, "page_token").ok()) {
+    return InvalidInput("BAD_PAGE_TOKEN", "page_token",
+                        "page_token is not one of a page before");
+  }
+  PageRequest page{.after = page_token};
+  if (page_size > 0) page.size = static_cast<int>(page_size);
+  return page;
+}
+
+absl::StatusOr<ModelUpload::Header> FromProto(const v1::ModelHeader& header) {
+  if (header.display_name().size() > kMaxDisplayNameBytes) {
+    return InvalidInput(
+        "NAME_TOO_LONG", "header.display_name",
+        absl::StrCat("display_name has ", header.display_name().size(),
+                     " bytes; at most ", kMaxDisplayNameBytes));
+  }
+  return ModelUpload::Header{.dimension = header.dimension(),
+                             .vertex_count = header.vertex_count(),
+                             .face_count = header.face_count()};
+}
+
+absl::StatusOr<BindSpec> FromProto(const v1::CreateBindingRequest& request) {
+  DEFORM_ASSIGN_OR_RETURN(std::string tenant, TenantOr(request.tenant()));
+  DEFORM_RETURN_IF_ERROR(CheckName(request.model_id(), "model_id"));
+  if (request.scheme().empty()) {
+    return InvalidInput("MISSING_FIELD", "scheme",
+                        "scheme is an id of ListSchemes, such as green");
+  }
+  if (!v1::Unbindable_IsValid(request.unbindable())) {
+    return UnknownValue("unbindable", request.unbindable());
+  }
+  DEFORM_ASSIGN_OR_RETURN(Rig rig,
+                          ToRig(request.rig(), request.flip_inside_out()));
+  DEFORM_ASSIGN_OR_RETURN(ExitRegions exits, ToExitRegions(request.exits()));
+  const auto& weights = request.options().handle_weights();
+  return BindSpec{
+      .tenant = std::move(tenant),
+      .model_id = request.model_id(),
+      .rig = std::move(rig),
+      .scheme = request.scheme(),
+      .options = {.handle_weights = {weights.begin(), weights.end()},
+                  .lambda = request.options().lambda()},
+      .exits = std::move(exits),
+      .unbindable = request.unbindable() == v1::UNBINDABLE_REPORT
+                        ? Unbindable::kReport
+                        : Unbindable::kFail};
+}
+
+absl::StatusOr<PoseUpdate> FromProto(const v1::Pose& pose, int dimension) {
+  PoseUpdate update;
+  DEFORM_ASSIGN_OR_RETURN(update.vertices,
+                          ToIndices(pose.vertices(), "pose.vertices"));
+  DEFORM_ASSIGN_OR_RETURN(
+      update.positions,
+      ToPositions(pose.positions(), dimension, "pose.positions"));
+  if (pose.has_stretch_blend()) update.stretch_blend = pose.stretch_blend();
+  return update;
+}
+
+absl::StatusOr<JoinRequest> FromProto(const v1::Join& join) {
+  JoinRequest request;
+  DEFORM_ASSIGN_OR_RETURN(request.tenant, TenantOr(join.tenant()));
+  DEFORM_RETURN_IF_ERROR(CheckName(join.session_id(), "session_id"));
+  request.session_id = join.session_id();
+  if (!v1::Delivery_IsValid(join.delivery())) {
+    return UnknownValue("delivery", join.delivery());
+  }
+  if (join.delivery() == v1::DELIVERY_EVERY)
+    request.delivery = Delivery::kEvery;
+  if (join.encodings().empty()) request.encoding = FindEncoding("float32");
+  const int offered = std::min(join.encodings_size(), kMaxEncodings);
+  for (int i = 0; i < offered && request.encoding == nullptr; ++i) {
+    request.encoding = FindEncoding(join.encodings(i));
+  }
+  if (request.encoding == nullptr) {
+    std::vector<absl::string_view> known;
+    for (const FrameEncoding* e : AllEncodings()) known.push_back(e->id());
+    return InvalidInput("UNKNOWN_ENCODING", "encodings",
+                        absl::StrCat("none of the encodings is known; known: ",
+                                     absl::StrJoin(known, ", ")));
+  }
+  return request;
+}
+
+void ToProto(const ModelRecord& record, v1::Model* model) {
+  const Mesh& mesh = *record.mesh;
+  model->set_tenant(record.tenant);
+  model->set_model_id(record.id);
+  model->set_display_name(record.display_name);
+  model->set_dimension(mesh.dimension());
+  model->set_vertex_count(mesh.size());
+  model->set_face_count(mesh.faces().rows());
+  for (int c = 0; c < mesh.dimension(); ++c) {
+    model->add_box_min(mesh.box().min[c]);
+    model->add_box_max(mesh.box().max[c]);
+  }
+  ToProto(record.create_time, model->mutable_create_time());
+}
+
+void ToProto(const BindingRecord& record, Detail detail, v1::Binding* out) {
+  const Binding& binding = *record.binding;
+  out->set_tenant(record.tenant);
+  out->set_binding_id(record.id);
+  out->set_model_id(record.model_id);
+  out->set_scheme(std::string(binding.scheme().id()));
+  out->set_dimension(binding.dimension());
+  out->set_point_count(binding.point_count());
+  out->set_vertex_count(binding.vertex_count());
+  out->set_normal_count(binding.normal_count());
+  out->set_rig_diagonal(DiagonalOf(binding.rig()));
+  out->set_weight_bytes(binding.weights().bytes());
+  out->set_compute_seconds(binding.compute_seconds());
+  out->set_reproduction_error(binding.quality().reproduction_error);
+  out->set_weight_sum_max(binding.quality().weight_sum_max);
+  out->set_unbound_count(binding.unbound_count());
+  ToProto(record.create_time, out->mutable_create_time());
+  if (detail == Detail::kSummary) return;
+  for (const UnboundPoints& unbound : binding.unbound()) {
+    auto* to = out->add_unbound();
+    to->set_reason(unbound.reason);
+    to->mutable_points()->Add(unbound.points.begin(), unbound.points.end());
+  }
+  for (const ExitPart& part : binding.exit_parts()) {
+    auto* to = out->add_exit_parts();
+    to->set_exit_face(part.exit_face);
+    to->set_point_count(part.points.size());
+    if (!part.points.empty()) to->set_first_point(part.points.front());
+    to->mutable_crossed_faces()->Add(part.crossed_faces.begin(),
+                                     part.crossed_faces.end());
+  }
+  for (const std::string& warning : binding.warnings()) {
+    out->add_warnings(warning);
+  }
+}
+
+void ToProto(const Rig& rig, v1::Rig* out) {
+  const int dimension = DimensionOf(rig);
+  if (const Cage* cage = std::get_if<Cage>(&rig)) {
+    out->mutable_cage()->set_dimension(dimension);
+    AddRows(cage->vertices(), dimension,
+            out->mutable_cage()->mutable_vertices());
+    const Faces& faces = cage->faces();
+    out->mutable_cage()->mutable_corners()->Add(faces.data(),
+                                                faces.data() + faces.size());
+    return;
+  }
+  out->mutable_handles()->set_dimension(dimension);
+  AddRows(RestVertices(rig), dimension,
+          out->mutable_handles()->mutable_positions());
+}
+
+void ToProto(const SessionState& state, v1::Session* session) {
+  session->set_tenant(state.tenant);
+  session->set_session_id(state.id);
+  session->set_binding_id(state.binding_id);
+  session->set_revision(state.revision);
+  session->set_epoch(state.epoch);
+  session->set_participant_count(state.participants);
+  ToProto(state.create_time, session->mutable_create_time());
+}
+
+void ToProto(const CoordinateScheme& scheme, v1::Scheme* out) {
+  out->set_scheme(std::string(scheme.id()));
+  out->set_description(std::string(scheme.description()));
+  out->set_takes_cage(scheme.rig_kind() == RigKind::kCage);
+  out->set_uses_normals(scheme.uses_normals());
+}
+
+void ToProto(const Session& session, const Session::Joined& joined,
+             const FrameEncoding& encoding, v1::Joined* out) {
+  const Binding& binding = session.binding();
+  ToProto(joined.state, out->mutable_session());
+  out->set_encoding(std::string(encoding.id()));
+  out->set_dimension(binding.dimension());
+  out->set_point_count(binding.point_count());
+  out->set_vertex_count(binding.vertex_count());
+  AddRows(joined.pose.vertices, binding.dimension(), out->mutable_pose());
+  out->set_stretch_blend(joined.pose.stretch_blend);
+}
+
+}  // namespace deform::server

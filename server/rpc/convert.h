@@ -1,0 +1,56 @@
+// Between the messages of deform/v1 and the values of the rooms behind.
+//
+// What comes from outside is checked here as far as its shape goes, so that
+// what is handed on is a value; the rooms check what it means. Every refusal is
+// an InvalidArgument that names the field.
+#pragma once
+
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "absl/time/time.h"
+#include "core/deform/pose.h"
+#include "deform/v1/binding.pb.h"
+#include "deform/v1/model.pb.h"
+#include "deform/v1/session.pb.h"
+#include "server/models/binding_registry.h"
+#include "server/models/model_registry.h"
+#include "server/models/model_upload.h"
+#include "server/sessions/session.h"
+
+namespace deform::server {
+
+// PAGE_TOO_LARGE, BAD_PAGE_TOKEN.
+absl::StatusOr<PageRequest> ToPageRequest(uint32_t page_size,
+                                          const std::string& page_token);
+
+// NAME_TOO_LONG for the display name; counts are ModelUpload's to check.
+absl::StatusOr<ModelUpload::Header> FromProto(const v1::ModelHeader& header);
+
+// BAD_NAME, MISSING_FIELD (scheme, rig), WRONG_LENGTH, BAD_DIMENSION,
+// INDEX_OUT_OF_RANGE, UNKNOWN_VALUE, and what Cage and Handles refuse.
+absl::StatusOr<BindSpec> FromProto(const v1::CreateBindingRequest& request);
+
+// WRONG_LENGTH, INDEX_OUT_OF_RANGE; CheckPoseUpdate() checks the rest.
+absl::StatusOr<PoseUpdate> FromProto(const v1::Pose& pose, int dimension);
+
+struct JoinRequest {
+  std::string tenant;
+  std::string session_id;
+  Delivery delivery = Delivery::kLatest;
+  const FrameEncoding* encoding = nullptr;  // The first that is known.
+};
+// BAD_NAME, UNKNOWN_VALUE (delivery), UNKNOWN_ENCODING.
+absl::StatusOr<JoinRequest> FromProto(const v1::Join& join);
+
+void ToProto(const ModelRecord& record, v1::Model* model);
+// In full, or without the lists that grow with the model.
+enum class Detail { kFull, kSummary };
+void ToProto(const BindingRecord& record, Detail detail, v1::Binding* binding);
+void ToProto(const Rig& rig, v1::Rig* out);
+void ToProto(const SessionState& state, v1::Session* session);
+void ToProto(const CoordinateScheme& scheme, v1::Scheme* out);
+void ToProto(const Session& session, const Session::Joined& joined,
+             const FrameEncoding& encoding, v1::Joined* out);
+
+}  // namespace deform::server

@@ -1,0 +1,264 @@
+#include "server/rpc/deform_reactor.h"
+
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/error.h"
+#include "core/base/status_macros.h"
+#include "server/rpc/calls.h"
+#include "server/rpc/convert.h"
+#include "server/rpc/frame_message.h"
+#include "server/rpc/message_bytes.h"
+#include "server/rpc/status.h"
+
+namespace deform::server {
+
+DeformReactor* DeformStreams::Open(grpc::CallbackServerContext* context) {
+  auto reactor = std::make_shared<DeformReactor>(*this, context);
+  {
+    MutexLock lock(mutex_);
+    reactors_.insert(reactor);
+  }
+  reactor->Start();
+  return reactor.get();
+}
+
+void DeformStreams::Close(DeformReactor* reactor) {
+  // Destroyed after the lock is released.
+  const auto keep = reactor->shared_from_this();
+  MutexLock lock(mutex_);
+  reactors_.erase(keep);
+}
+
+size_t DeformStreams::size() const {
+  MutexLock lock(mutex_);
+  return reactors_.size();
+}
+
+void DeformStreams::CheckStalls() {
+  std::vector<std::shared_ptr<DeformReactor>> reactors;
+  {
+    MutexLock lock(mutex_);
+    reactors.assign(reactors_.begin(), reactors_.end());
+  }
+  const auto now = sessions_.clock()();
+  for (const auto& reactor : reactors) reactor->CheckStall(now);
+}
+
+DeformReactor::DeformReactor(DeformStreams& streams,
+                             grpc::CallbackServerContext* context)
+    : streams_(streams),
+      context_(context),
+      begin_(streams.sessions_.clock()()),
+      deadline_(begin_ + streams.stall_timeout_) {}
+
+void DeformReactor::Start() {
+  MutexLock lock(mutex_);
+  reading_ = true;
+  StartRead(&incoming_);
+}
+
+void DeformReactor::OnReadDone(bool ok) {
+  v1::DeformRequest request;
+  const bool parsed = ok && ParseMessage(incoming_, request);
+  incoming_.Clear();
+  if (parsed) HandleMessage(request);
+  MutexLock lock(mutex_);
+  reading_ = false;
+  if (!ok) {
+    half_closed_ = true;
+    if (participant_ != nullptr) {
+      participant_->HalfClose();
+    } else {
+      End(InvalidInput("JOIN_FIRST", "join",
+                       "the stream ended before it joined a session"));
+    }
+  } else if (!parsed) {
+    End(InvalidInput("MALFORMED_MESSAGE", "message",
+                     "the message is no DeformRequest"));
+  }
+  Advance();
+}
+
+void DeformReactor::HandleMessage(const v1::DeformRequest& request) {
+  const bool joined = participant() != nullptr;
+  if (request.has_join() && !joined) {
+    HandleJoin(request.join());
+  } else if (request.has_pose() && joined) {
+    HandlePose(request.pose());
+  } else {
+    MutexLock lock(mutex_);
+    End(joined ? InvalidInput("POSE_EXPECTED", "pose",
+                              "after joining, a stream has poses only")
+               : InvalidInput("JOIN_FIRST", "join",
+                              "the first message of a stream is join"));
+  }
+}
+
+void DeformReactor::HandleJoin(const v1::Join& join) {
+  const auto joining = [&]() -> absl::Status {
+    DEFORM_ASSIGN_OR_RETURN(const JoinRequest request, FromProto(join));
+    DEFORM_ASSIGN_OR_RETURN(const auto session,
+                            streams_.sessions_.catalogue().Find(
+                                request.tenant, request.session_id));
+    DEFORM_ASSIGN_OR_RETURN(
+        Session::Joined joined,
+        session->Join(request.delivery, *request.encoding, weak_from_this()));
+    v1::Joined message;
+    ToProto(*session, joined, *request.encoding, &message);
+    MutexLock lock(mutex_);
+    joined_ = std::move(message);
+    participant_ = std::move(joined.participant);
+    if (finished_) {
+      participant_->Leave();
+    } else {
+      deadline_.reset();
+    }
+    return absl::OkStatus();
+  };
+  if (const absl::Status status = joining(); !status.ok()) {
+    MutexLock lock(mutex_);
+    End(status);
+  }
+}
+
+void DeformReactor::HandlePose(const v1::Pose& pose) {
+  Participant& participant = *this->participant();
+  participant.Submit(
+      pose.sequence(),
+      FromProto(pose, participant.session().binding().dimension()));
+  MutexLock lock(mutex_);
+  ++poses_;
+}
+
+Participant* DeformReactor::participant() const {
+  MutexLock lock(mutex_);
+  return participant_.get();
+}
+
+void DeformReactor::OnWriteDone(bool ok) {
+  MutexLock lock(mutex_);
+  writing_ = false;
+  // Broken: OnCancel() ends it.
+  if (!ok) return;
+  if (participant_ != nullptr) participant_->Progressed();
+  Advance();
+}
+
+void DeformReactor::Wake() {
+  MutexLock lock(mutex_);
+  Advance();
+}
+
+void DeformReactor::Advance() {
+  if (finished_ || participant_ == nullptr) return;
+  if (!writing_) StartNextWrite();
+  if (!finished_ && !reading_ && !half_closed_ && participant_->WantsPoses()) {
+    reading_ = true;
+    StartRead(&incoming_);
+  }
+}
+
+void DeformReactor::StartNextWrite() {
+  if (joined_) {
+    v1::DeformResponse response;
+    *response.mutable_joined() = *std::move(joined_);
+    joined_.reset();
+    Write(response);
+    return;
+  }
+  if (frame_) {
+    WriteChunk();
+    return;
+  }
+  std::optional<Outgoing> next = participant_->Take();
+  if (!next) return;
+  if (auto* frame = std::get_if<FrameToSend>(&*next)) {
+    frame_ = FrameInProgress{.send = std::move(*frame)};
+    WriteChunk();
+  } else if (auto* rejection = std::get_if<Rejection>(&*next)) {
+    v1::DeformResponse response;
+    response.mutable_rejected()->set_sequence(rejection->sequence);
+    *response.mutable_rejected()->mutable_status() =
+        ToRpcStatus(rejection->status);
+    Write(response);
+  } else {
+    End(std::get<Ended>(*next).status);
+  }
+}
+
+void DeformReactor::WriteChunk() {
+  outgoing_ = FrameMessage(frame_->send, frame_->next_chunk++,
+                           participant_->session().epoch());
+  if (frame_->next_chunk == frame_->send.frame->chunks.size()) {
+    frame_.reset();
+    ++frames_;
+  }
+  writing_ = true;
+  StartWrite(&outgoing_);
+}
+
+void DeformReactor::Write(const v1::DeformResponse& response) {
+  outgoing_ = SerializeMessage(response);
+  writing_ = true;
+  StartWrite(&outgoing_);
+}
+
+void DeformReactor::End(const absl::Status& status) {
+  if (finished_) return;
+  finished_ = status;
+  deadline_ = streams_.sessions_.clock()() + streams_.stall_timeout_;
+  if (participant_ != nullptr) participant_->Leave();
+  if (status.ok() || writing_) {
+    Finish(ToGrpcStatus(status));
+    return;
+  }
+  v1::DeformResponse response;
+  *response.mutable_ended() = ToRpcStatus(status);
+  outgoing_ = SerializeMessage(response);
+  writing_ = true;
+  StartWriteAndFinish(&outgoing_, grpc::WriteOptions(), ToGrpcStatus(status));
+}
+
+void DeformReactor::OnCancel() {
+  MutexLock lock(mutex_);
+  if (finished_) return;
+  // Nobody listens any more; no in-band message.
+  writing_ = true;
+  End(absl::CancelledError("the caller left"));
+}
+
+void DeformReactor::CheckStall(TimePoint now) {
+  MutexLock lock(mutex_);
+  const bool overdue = deadline_ && now >= *deadline_;
+  if (finished_) {
+    if (overdue) context_->TryCancel();
+  } else if (overdue) {
+    End(MakeError(absl::StatusCode::kDeadlineExceeded,
+                  "the stream did not join a session in time (stall-timeout)",
+                  {.reason = "JOIN_TIMEOUT", .field = "join"}));
+  } else if (participant_ != nullptr) {
+    const absl::Status status = participant_->CheckStall();
+    if (!status.ok()) End(status);
+  }
+}
+
+void DeformReactor::OnDone() {
+  std::string call = "Deform";
+  absl::Status status;
+  {
+    MutexLock lock(mutex_);
+    if (participant_ != nullptr) {
+      absl::StrAppend(&call, " session ", participant_->session().id(), ", ",
+                      poses_, " poses, ", frames_, " frames,");
+    }
+    status = *finished_;
+  }
+  LogCall(call, context_->peer(), status,
+          streams_.sessions_.clock()() - begin_);
+  streams_.Close(this);
+}
+
+}  // namespace deform::server

@@ -1,0 +1,100 @@
+#include "server/server.h"
+
+#include <utility>
+
+#include "core/base/status_macros.h"
+#include "core/base/thread_pool.h"
+#include "server/models/binding_registry.h"
+#include "server/models/model_registry.h"
+#include "server/rpc/grpc_server.h"
+#include "server/sessions/session_manager.h"
+
+namespace deform::server {
+namespace {
+
+// Binding yields to sessions.
+constexpr int kBackgroundNiceness = 10;
+
+ModelRegistry::Limits ModelLimits(const Options& options) {
+  return {.model_bytes = options.max_model_bytes.value,
+          .memory = options.max_models_memory.value,
+          .count = options.max_models};
+}
+
+BindingRegistry::Limits BindingLimits(const Options& options) {
+  return {.memory = options.max_bindings_memory.value,
+          .count = options.max_bindings,
+          .concurrent = options.max_concurrent_binds,
+          .waiting_calls = options.max_waiting_binds};
+}
+
+SessionEnvironment EnvironmentOf(const Options& options, ThreadPool& compute) {
+  return {.executor =
+              [&compute](std::function<void()> task) {
+                compute.Submit(std::move(task));
+              },
+          .pool = &compute,
+          .clock = [] { return std::chrono::steady_clock::now(); },
+          .max_participants = options.max_participants,
+          .stall_timeout = options.stall_timeout.milliseconds()};
+}
+
+}  // namespace
+
+// From the bottom up.
+struct Server::Parts {
+  explicit Parts(const Options& options)
+      : compute(std::make_unique<ThreadPool>(
+            ThreadPool::Options{.threads = options.compute_threads})),
+        binds({.threads = options.compute_threads,
+               .niceness = kBackgroundNiceness}),
+        background({.threads = options.compute_threads,
+                    .niceness = kBackgroundNiceness}),
+        models(ModelLimits(options)),
+        bindings(models, binds, BindingLimits(options)),
+        sessions(bindings.catalogue(),
+                 {.memory = options.max_sessions_memory.value,
+                  .count = options.max_sessions},
+                 EnvironmentOf(options, *compute)) {}
+
+  // Streams end first; then the steps they left behind, which hold sessions;
+  // then the rest, from the top down.
+  ~Parts() {
+    grpc.reset();
+    compute.reset();
+  }
+
+  std::unique_ptr<ThreadPool> compute;  // Deforming and encoding.
+  ThreadPool binds;                     // Weights.
+  ThreadPool background;  // Weights again, for those who ask to see them.
+  ModelRegistry models;
+  BindingRegistry bindings;
+  SessionManager sessions;
+  std::unique_ptr<GrpcServer> grpc;
+};
+
+absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Options& options) {
+  auto parts = std::make_unique<Parts>(options);
+  DEFORM_ASSIGN_OR_RETURN(
+      parts->grpc,
+      GrpcServer::Start({.listen = options.listen,
+                         .max_call_threads = options.max_call_threads,
+                         .stall_timeout = options.stall_timeout.milliseconds()},
+                        {.models = parts->models,
+                         .bindings = parts->bindings,
+                         .sessions = parts->sessions,
+                         .background = parts->background}));
+  return std::unique_ptr<Server>(new Server(std::move(parts)));
+}
+
+Server::Server(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+
+Server::~Server() = default;
+
+const std::string& Server::address() const { return parts_->grpc->address(); }
+
+bool Server::Drain(std::chrono::milliseconds patience) {
+  return parts_->grpc->Drain(patience);
+}
+
+}  // namespace deform::server

@@ -9,8 +9,9 @@
 namespace deform {
 namespace {
 
-// Tiles that one body of a parallel loop walks.
-constexpr int64_t kTilesPerBlock = 128;
+// Tiles that one body of a parallel loop walks: some milliseconds at most, and
+// sums that fit the second cache.
+constexpr int64_t kTilesPerBlock = 256;
 // Below this many products a loop is not worth sharing among threads.
 constexpr int64_t kParallelProducts = 1 << 18;
 // Sums gather a rounding of 1e-16 D a step; after so many they are made anew.
@@ -33,7 +34,7 @@ Deformer::Deformer(std::shared_ptr<const Binding> binding, ThreadPool* pool)
       posed_columns_(binding_->rig(), binding_->scheme().uses_normals()),
       pose_(RestPose(binding_->rig())),
       columns_(posed_columns_.rest()),
-      displacement_(binding_->weights().tiles() * 3 * kTilePoints, 0.0) {
+      displacement_(binding_->weights().tiles() * kTileSums, 0.0) {
   if (!binding_->fixed_points().empty()) {
     fixed_.assign(binding_->point_count(), 0);
     for (const int64_t point : binding_->fixed_points()) fixed_[point] = 1;
@@ -102,12 +103,12 @@ void Deformer::ApplyAll() {
       residuals[c * 3 + d] = static_cast<float>(residual(d));
     }
   }
-  ForEachTile([&](int64_t t) {
-    float sums[3 * kTilePoints];
-    ApplyTile(binding_->weights().tile(t), columns_.rows(), residuals.data(),
-              sums);
-    std::copy(sums, sums + 3 * kTilePoints,
-              displacement_.data() + t * 3 * kTilePoints);
+  ForEachBlock([&](int64_t first, int64_t count) {
+    std::vector<float> sums(count * kTileSums);
+    ApplyTiles(binding_->weights().tile(first), count, columns_.rows(), 1,
+               residuals.data(), sums.data());
+    std::copy(sums.begin(), sums.end(),
+              displacement_.data() + first * kTileSums);
   });
 }
 
@@ -120,18 +121,18 @@ void Deformer::ApplyChanged(const std::vector<int32_t>& changed,
   for (const int32_t c : changed) {
     for (int d = 0; d < 3; ++d) deltas.push_back(next(c, d) - columns_(c, d));
   }
-  ForEachTile([&](int64_t t) {
-    AddTileColumns(binding_->weights().tile(t), changed.data(),
-                   static_cast<int64_t>(changed.size()), deltas.data(),
-                   displacement_.data() + t * 3 * kTilePoints);
+  ForEachBlock([&](int64_t first, int64_t count) {
+    AddTileColumns(binding_->weights().tile(first), count, columns_.rows(),
+                   changed.data(), static_cast<int64_t>(changed.size()),
+                   deltas.data(), displacement_.data() + first * kTileSums);
   });
 }
 
-void Deformer::ForEachTile(absl::FunctionRef<void(int64_t)> body) {
+void Deformer::ForEachBlock(absl::FunctionRef<void(int64_t, int64_t)> body) {
   const int64_t tiles = binding_->weights().tiles();
   const auto block = [&](int64_t b) {
-    const int64_t end = std::min(tiles, (b + 1) * kTilesPerBlock);
-    for (int64_t t = b * kTilesPerBlock; t < end; ++t) body(t);
+    const int64_t first = b * kTilesPerBlock;
+    body(first, std::min(kTilesPerBlock, tiles - first));
   };
   const int64_t blocks = (tiles + kTilesPerBlock - 1) / kTilesPerBlock;
   const int64_t products = tiles * kTilePoints * columns_.rows();
@@ -145,8 +146,7 @@ void Deformer::ForEachTile(absl::FunctionRef<void(int64_t)> body) {
 Vec3 Deformer::PointAt(int64_t point) const {
   const Vec3 rest = binding_->model()->positions().row(point).transpose();
   if (!fixed_.empty() && fixed_[point]) return rest;
-  const double* sums = displacement_.data() +
-                       point / kTilePoints * 3 * kTilePoints +
+  const double* sums = displacement_.data() + point / kTilePoints * kTileSums +
                        point % kTilePoints;
   return map_(rest) + Vec3(sums[0], sums[kTilePoints], sums[2 * kTilePoints]);
 }

@@ -64,7 +64,8 @@ class Deformer {
                    const Columns& next) const;
   void ApplyAll();
   void ApplyChanged(const std::vector<int32_t>& changed, const Columns& next);
-  void ForEachTile(absl::FunctionRef<void(int64_t)> body);
+  // Calls body(first tile, count) for runs of tiles, on the pool if that pays.
+  void ForEachBlock(absl::FunctionRef<void(int64_t, int64_t)> body);
   Vec3 PointAt(int64_t point) const;
 
   const std::shared_ptr<const Binding> binding_;
@@ -76,7 +77,7 @@ class Deformer {
   Columns columns_;  // Of pose_.
   AffineMap map_;    // T, as of the last full pass.
   int steps_since_full_ = 0;
-  std::vector<double> displacement_;  // tiles x 3 x 16, the two sums above.
+  std::vector<double> displacement_;  // tiles x kTileSums: the sums above.
 };
 
 }  // namespace deform

@@ -2,70 +2,143 @@
 
 #include <gtest/gtest.h>
 
+#include <hwy/targets.h>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <vector>
 
 namespace deform {
 namespace {
 
+// Runs `body` once for each instruction set that the machine has.
+template <typename Body>
+void ForEachInstructionSet(Body body) {
+  const int64_t supported = hwy::SupportedTargets();
+  int sets = 0;
+  for (int bit = 0; bit < 63; ++bit) {
+    const int64_t target = int64_t{1} << bit;
+    if ((supported & target) == 0) continue;
+    SCOPED_TRACE(hwy::TargetName(target));
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    body();
+    ++sets;
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  EXPECT_GT(sets, 0);
+}
+
 // Random weights in the size of real ones, and columns in [-1, 1].
 struct Problem {
-  Problem(int64_t points, int64_t columns) : weights(points, columns) {
+  Problem(int64_t tiles, int64_t columns, int64_t sets)
+      : weights(tiles * kTilePoints, columns) {
     std::mt19937 random(7);
     std::uniform_real_distribution<double> uniform(-1, 1);
-    for (int64_t i = 0; i < points; ++i) {
+    for (int64_t i = 0; i < weights.points(); ++i) {
       for (int64_t c = 0; c < columns; ++c) {
         weights.set(i, c, static_cast<float>(uniform(random)));
       }
     }
-    for (int64_t k = 0; k < columns * 3; ++k) column.push_back(uniform(random));
+    for (int64_t k = 0; k < columns * sets * 3; ++k) {
+      column.push_back(static_cast<float>(uniform(random)));
+    }
+    column_double.assign(column.begin(), column.end());
   }
 
   WeightTiles weights;
-  std::vector<double> column;
+  std::vector<float> column;
+  std::vector<double> column_double;
 };
 
-class ApplyWeights : public testing::TestWithParam<int> {};
+struct Size {
+  int64_t tiles;
+  int64_t columns;
+  int64_t sets;
+};
+
+class ApplyWeights : public testing::TestWithParam<Size> {};
 
 TEST_P(ApplyWeights, AgreesWithThePlainVersion) {
-  const int columns = GetParam();
-  const Problem problem(40, columns);
-  const std::vector<float> column(problem.column.begin(), problem.column.end());
-  for (int64_t t = 0; t < problem.weights.tiles(); ++t) {
-    double judge[3 * kTilePoints];
-    float fast[3 * kTilePoints];
-    ApplyTilePlain(problem.weights.tile(t), columns, problem.column.data(),
-                   judge);
-    ApplyTile(problem.weights.tile(t), columns, column.data(), fast);
-    for (int i = 0; i < 3 * kTilePoints; ++i) {
+  const auto [tiles, columns, sets] = GetParam();
+  const Problem problem(tiles, columns, sets);
+  std::vector<double> judge(tiles * sets * kTileSums);
+  ApplyTilesPlain(problem.weights.tile(0), tiles, columns, sets,
+                  problem.column_double.data(), judge.data());
+  ForEachInstructionSet([&] {
+    // One float in front: the output need not be aligned.
+    std::vector<float> out(judge.size() + 2, 9.0f);
+    ApplyTiles(problem.weights.tile(0), tiles, columns, sets,
+               problem.column.data(), out.data() + 1);
+    for (size_t i = 0; i < judge.size(); ++i) {
       // Float sums: one rounding a column, of terms of at most 1.
-      EXPECT_NEAR(fast[i], judge[i], 1.2e-7 * (columns + 1));
+      ASSERT_NEAR(out[i + 1], judge[i], 1.2e-7 * static_cast<double>(columns));
     }
-  }
+    EXPECT_EQ(out.front(), 9.0f);
+    EXPECT_EQ(out.back(), 9.0f);
+  });
 }
 
-TEST_P(ApplyWeights, AddingAllColumnsIsApplyingThem) {
-  const int columns = GetParam();
-  const Problem problem(17, columns);
+TEST_P(ApplyWeights, AddsSomeColumnsAsThePlainVersionDoes) {
+  const auto [tiles, columns, sets] = GetParam();
+  const Problem problem(tiles, columns, sets);
   std::vector<int32_t> index;
-  for (int c = 0; c < columns; ++c) index.push_back(c);
-  for (int64_t t = 0; t < problem.weights.tiles(); ++t) {
-    double judge[3 * kTilePoints];
-    double sums[3 * kTilePoints];
-    std::fill(std::begin(sums), std::end(sums), 5.0);
-    ApplyTilePlain(problem.weights.tile(t), columns, problem.column.data(),
-                   judge);
-    AddTileColumns(problem.weights.tile(t), index.data(), columns,
-                   problem.column.data(), sums);
-    for (int i = 0; i < 3 * kTilePoints; ++i) {
-      EXPECT_NEAR(sums[i], judge[i] + 5, 1e-13);  // Double sums.
+  for (int32_t c = 0; c < columns; c += 3) index.push_back(c);
+  std::vector<double> judge(tiles * kTileSums, 5.0);
+  AddTileColumnsPlain(problem.weights.tile(0), tiles, columns, index.data(),
+                      static_cast<int64_t>(index.size()),
+                      problem.column_double.data(), judge.data());
+  ForEachInstructionSet([&] {
+    std::vector<double> out(judge.size() + 1, 5.0);
+    AddTileColumns(problem.weights.tile(0), tiles, columns, index.data(),
+                   static_cast<int64_t>(index.size()),
+                   problem.column_double.data(), out.data());
+    for (size_t i = 0; i < judge.size(); ++i) {
+      ASSERT_NEAR(out[i], judge[i], 1e-13);  // Double sums of at most 110.
     }
-  }
+    EXPECT_EQ(out.back(), 5.0);
+  });
 }
 
-INSTANTIATE_TEST_SUITE_P(Columns, ApplyWeights,
-                         testing::Values(0, 1, 2, 15, 16, 17, 326));
+INSTANTIATE_TEST_SUITE_P(Sizes, ApplyWeights,
+                         testing::ValuesIn<Size>({{0, 5, 1},
+                                                  {1, 0, 1},
+                                                  {1, 1, 1},
+                                                  {1, 326, 1},
+                                                  {2, 17, 1},
+                                                  {3, 16, 1},
+                                                  {4, 15, 1},
+                                                  {5, 44, 1},
+                                                  {9, 326, 1},
+                                                  {1, 7, 2},
+                                                  {2, 7, 3},
+                                                  {3, 7, 4},
+                                                  {4, 31, 5},
+                                                  {5, 9, 8},
+                                                  {7, 3, 33}}),
+                         [](const auto& test) {
+                           const Size& s = test.param;
+                           return std::to_string(s.tiles) + "Tiles" +
+                                  std::to_string(s.columns) + "Columns" +
+                                  std::to_string(s.sets) + "Sets";
+                         });
+
+TEST(ApplyWeights, PassesOnWhatIsNotANumberAndInfinity) {
+  Problem problem(2, 4, 1);
+  problem.weights.set(3, 1, std::numeric_limits<float>::quiet_NaN());
+  problem.weights.set(20, 2, std::numeric_limits<float>::infinity());
+  ForEachInstructionSet([&] {
+    std::vector<float> out(2 * kTileSums);
+    ApplyTiles(problem.weights.tile(0), 2, 4, 1, problem.column.data(),
+               out.data());
+    for (size_t i = 0; i < out.size(); ++i) {
+      const size_t point = i / kTileSums * kTilePoints + i % kTilePoints;
+      EXPECT_EQ(std::isnan(out[i]), point == 3);
+      EXPECT_EQ(std::isinf(out[i]), point == 20);
+    }
+  });
+}
 
 TEST(WeightTiles, PadTheLastTileWithZeros) {
   WeightTiles tiles(17, 3);

@@ -305,12 +305,12 @@ void Binder::Warn() {
   }
   for (const ExitPart& part : parts_.exit_parts) {
     if (part.crossed_faces.empty()) continue;
-    warnings.push_back(absl::StrCat(
-        "the ", part.points.size(), " points around point ",
-        part.points.front(), " leave through face ", part.exit_face,
-        " and also cross ", part.crossed_faces.size(),
-        " other faces, such as face ", part.crossed_faces.front(),
-        ": the map is smooth there only while these move alike"));
+    warnings.push_back(
+        absl::StrCat("the ", part.points.size(), " points around point ",
+                     part.points.front(), " leave through face ",
+                     part.exit_face, " and cross ", part.crossed_faces.size(),
+                     " more, such as face ", part.crossed_faces.front(),
+                     ": the map is smooth there only while these move alike"));
   }
   const int64_t outside =
       std::count(states_.begin(), states_.end(), PointState::kBoundOutside);

@@ -72,8 +72,15 @@ CageFaces::CageFaces(const Cage& cage) : corners_(cage.dimension()) {
       v[k] = cage.vertices().row(cage.faces()(f, k));
     }
     faces_.push_back(corners_ == 3 ? Triangle(v) : Segment(v[0], v[1]));
+    Face& face = faces_.back();
+    face.center.setZero();
     for (int k = 0; k < 3; ++k) {
-      faces_[f].corner[k] = k < corners_ ? cage.faces()(f, k) : -1;
+      face.corner[k] = k < corners_ ? cage.faces()(f, k) : -1;
+      if (k < corners_) face.center += (v[k] - v[0]) / corners_;
+    }
+    face.radius = 0;
+    for (int k = 0; k < corners_; ++k) {
+      face.radius = std::max(face.radius, (v[k] - v[0] - face.center).norm());
     }
   }
 }
@@ -122,9 +129,19 @@ CageFaces::Nearest CageFaces::NearestOn(int64_t f, const Vec3& x) const {
   return nearest;
 }
 
-CageFaces::Nearest CageFaces::NearestOf(const Vec3& x) const {
+bool CageFaces::MayBeWithin(double distance, int64_t f, const Vec3& x) const {
+  const Face& face = faces_[f];
+  const double to_center = (face.position[0] - x + face.center).norm();
+  // Rounding must not rule out a face.
+  return to_center * (1 - 1e-9) <= distance + face.radius * (1 + 1e-9);
+}
+
+CageFaces::Nearest CageFaces::NearestOf(const Vec3& x,
+                                        std::span<const char> allowed) const {
   Nearest nearest;
   for (int64_t f = 0; f < size(); ++f) {
+    if (!allowed.empty() && !allowed[f]) continue;
+    if (!MayBeWithin(nearest.distance, f, x)) continue;
     const Nearest candidate = NearestOn(f, x);
     if (candidate.distance < nearest.distance) nearest = candidate;
   }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "core/mesh/cage.h"
@@ -25,6 +26,8 @@ class CageFaces {
     Vec3 normal;
     Vec3 m[3];
     double height[3];  // Of corner q above edge q. 2D: the length, twice.
+    Vec3 center;       // Of a ball around the face, relative to corner 0.
+    double radius;
   };
   struct Nearest {
     int64_t face = -1;
@@ -45,10 +48,14 @@ class CageFaces {
   Vec3 Barycentric(int64_t f, const Vec3& x) const;
   // Closest point of face f.
   Nearest NearestOn(int64_t f, const Vec3& x) const;
-  // Closest point of all faces; of several the face with the lowest index.
-  Nearest NearestOf(const Vec3& x) const;
+  // Closest point of the faces whose entry in `allowed` is not 0 (empty: of
+  // all faces); of several the face with the lowest index.
+  Nearest NearestOf(const Vec3& x, std::span<const char> allowed = {}) const;
 
  private:
+  // False only if face f is farther from x than `distance`.
+  bool MayBeWithin(double distance, int64_t f, const Vec3& x) const;
+
   int corners_;
   std::vector<Face> faces_;
 };

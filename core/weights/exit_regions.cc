@@ -81,15 +81,21 @@ struct Meeting {
   double miss;  // By how much it misses the face, as a fraction; 0 is a hit.
 };
 
+// Nothing if it misses by more than `worst`.
 std::optional<Meeting> Meet(const CageFaces& faces, int32_t f,
-                            const Vec3& inside, const Vec3& outside) {
-  const double from = faces.Height(f, inside), to = faces.Height(f, outside);
+                            const Vec3& inside, const Vec3& outside,
+                            double worst) {
+  const CageFaces::Face& face = faces[f];
+  const double from = face.normal.dot(inside - face.position[0]);
+  const double to = face.normal.dot(outside - face.position[0]);
   if (!(to > from)) return std::nullopt;  // Parallel, or on the way in.
   const double at = -from / (to - from);
+  const double beyond = std::max({0.0, -at, at - 1});
+  if (beyond > worst) return std::nullopt;
   const Vec3 hit = inside + at * (outside - inside);
   const double off =
       -faces.Barycentric(f, hit).head(faces.corners()).minCoeff();
-  return Meeting{f, at, std::max({0.0, off, -at, at - 1})};
+  return Meeting{f, at, std::max(beyond, off)};
 }
 
 // The face through which the outside end of a segment left the cage: the last
@@ -103,7 +109,8 @@ int32_t CrossedFace(const CageFaces& faces, const std::vector<char>& named,
   Meeting closest{-1, 0, std::numeric_limits<double>::infinity()};
   double last = 0;
   for (int32_t f = 0; f < faces.size(); ++f) {
-    const std::optional<Meeting> meeting = Meet(faces, f, inside, outside);
+    const std::optional<Meeting> meeting =
+        Meet(faces, f, inside, outside, std::max(closest.miss, kSlack));
     if (!meeting) continue;
     if (meeting->miss < closest.miss) closest = *meeting;
     if (meeting->miss > kSlack) continue;
@@ -318,13 +325,8 @@ ExitAssignment Assigner::ByDistance() {
   Assignment assignment;
   for (int64_t i = 0; i < model_.size(); ++i) {
     if (!outside_.IsOutside(i)) continue;
-    CageFaces::Nearest nearest;
-    for (int64_t f = 0; f < faces_.size(); ++f) {
-      if (!named_[f]) continue;
-      const CageFaces::Nearest candidate = faces_.NearestOn(f, Point(i));
-      if (candidate.distance < nearest.distance) nearest = candidate;
-    }
-    const auto face = static_cast<int32_t>(nearest.face);
+    const auto face =
+        static_cast<int32_t>(faces_.NearestOf(Point(i), named_).face);
     assignment.Add(i, face, {.exit_face = face}, {});
   }
   return std::move(assignment).Take();

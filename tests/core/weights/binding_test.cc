@@ -201,21 +201,63 @@ TEST(Bind, WarnsWhereAPartCrossesSeveralFaces) {
   const auto binding = Bind(request, {});
   ASSERT_TRUE(binding.ok()) << binding.status();
   ASSERT_THAT((*binding)->warnings(), SizeIs(1));
-  EXPECT_THAT((*binding)->warnings()[0], HasSubstr("also cross 1 other face"));
+  EXPECT_THAT((*binding)->warnings()[0],
+              HasSubstr("and cross 1 more, such as face"));
 }
 
-TEST(Bind, GivesTheSameBitsOnAnyNumberOfThreads) {
+TEST(Bind, ExtendsToTheSameBitsOnAnyNumberOfThreads) {
   BindRequest request = RowOfPoints(3000);
   request.exits.kind = ExitRegions::Kind::kAutomatic;
-  ThreadPool one({.threads = 1}), many({.threads = 7});
+  ThreadPool pool({.threads = 7});
   const auto serial = Bind(request, {});
-  for (ThreadPool* pool : {&one, &many}) {
-    const auto parallel = Bind(request, {.pool = pool});
-    ASSERT_TRUE(parallel.ok()) << parallel.status();
-    EXPECT_TRUE(SameBits((*serial)->weights(), (*parallel)->weights()));
-    EXPECT_EQ((*serial)->quality().reproduction_error,
-              (*parallel)->quality().reproduction_error);
-  }
+  const auto parallel = Bind(request, {.pool = &pool});
+  ASSERT_TRUE(parallel.ok()) << parallel.status();
+  EXPECT_TRUE(SameBits((*serial)->weights(), (*parallel)->weights()));
+}
+
+TEST(Bind, WarnsOfHandlesAtTheSamePlace) {
+  BindRequest request = SphereInCube();
+  Positions handles(9, 3);
+  handles << Cube().vertices(), Cube().vertices().row(2);
+  request.rig = *Handles::Create(3, handles);
+  request.scheme = "s_cc";
+  const auto binding = Bind(request, {});
+  ASSERT_TRUE(binding.ok()) << binding.status();
+  EXPECT_THAT((*binding)->warnings(),
+              ElementsAre("handles 2 and 8 coincide and share their weight"));
+}
+
+TEST(Bind, WarnsOfOutsidePointsThatNeedNoExitFace) {
+  BindRequest request = RowOfPoints(7);
+  request.scheme = "mean_value";
+  const auto binding = Bind(request, {});
+  ASSERT_TRUE(binding.ok()) << binding.status();
+  ASSERT_THAT((*binding)->warnings(), SizeIs(1));
+  EXPECT_THAT((*binding)->warnings()[0],
+              StartsWith("2 points lie outside the cage"));
+}
+
+TEST(Bind, RefusesExitFacesForHandles) {
+  BindRequest request = SphereInCube();
+  request.rig = *Handles::Create(3, Cube().vertices());
+  request.scheme = "s_cc";
+  request.exits.kind = ExitRegions::Kind::kAutomatic;
+  const absl::Status status = Bind(request, {}).status();
+  EXPECT_EQ(DetailOf(status).reason, "WRONG_RIG");
+  EXPECT_EQ(status.message(), "exit faces belong to a cage; handles have none");
+}
+
+TEST(Bind, NamesPointsOutsideTheHullOfTheHandles) {
+  BindRequest request = RowOfPoints(7);
+  request.rig = *Handles::Create(3, Cube().vertices());
+  request.scheme = "s_cc";
+  const absl::Status status = Bind(request, {}).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(DetailOf(status).reason, "OUTSIDE_HULL");
+  EXPECT_THAT(
+      std::string(status.message()),
+      StartsWith("2 points lie outside the convex hull of the handles: 5, 6; "
+                 "add handles around them"));
 }
 
 TEST(Bind, ReportsProgressUpToTheLastPoint) {
@@ -274,6 +316,62 @@ TEST(Bind, StopsWithinABlockWhenCancelled) {
   EXPECT_LT(done, request.model->size() / 2);
 }
 
+// Every scheme, in 3D: a ball of points within a cube, or its corners.
+class BindEvery : public testing::TestWithParam<const CoordinateScheme*> {
+ protected:
+  static BindRequest Request() {
+    BindRequest request = SphereInCube();
+    request.scheme = std::string(GetParam()->id());
+    if (GetParam()->rig_kind() == RigKind::kHandles) {
+      request.rig = *Handles::Create(3, Cube().vertices());
+    }
+    return request;
+  }
+};
+
+TEST_P(BindEvery, SchemeGivesTheSameBitsOnAnyNumberOfThreads) {
+  ThreadPool one({.threads = 1}), many({.threads = 7});
+  const auto serial = Bind(Request(), {});
+  ASSERT_TRUE(serial.ok()) << serial.status();
+  for (ThreadPool* pool : {&one, &many}) {
+    const auto parallel = Bind(Request(), {.pool = pool});
+    ASSERT_TRUE(parallel.ok()) << parallel.status();
+    EXPECT_TRUE(SameBits((*serial)->weights(), (*parallel)->weights()));
+    EXPECT_EQ((*serial)->quality().reproduction_error,
+              (*parallel)->quality().reproduction_error);
+    EXPECT_EQ((*serial)->quality().iterations_mean,
+              (*parallel)->quality().iterations_mean);
+  }
+}
+
+TEST_P(BindEvery, SchemeRecomputesWhatWasRounded) {
+  const auto binding = Bind(Request(), {});
+  ASSERT_TRUE(binding.ok()) << binding.status();
+  const int64_t vertices = (*binding)->vertex_count();
+  // Ranges that begin and end within, before and after blocks.
+  for (const auto& [first, count] :
+       {std::pair{0, 642}, {3, 1}, {250, 300}, {641, 1}, {642, 0}}) {
+    SCOPED_TRACE(first);
+    const auto block = RecomputeWeights(**binding, first, count);
+    ASSERT_TRUE(block.ok()) << block.status();
+    ASSERT_EQ(block->vertex.rows(), count);
+    ASSERT_EQ(block->normal.cols(), (*binding)->normal_count());
+    for (int i = 0; i < count; ++i) {
+      for (int k = 0; k < vertices; ++k) {
+        EXPECT_EQ((*binding)->weights().at(first + i, k),
+                  static_cast<float>(block->vertex(i, k)));
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(AllSchemes, BindEvery,
+                         testing::ValuesIn(AllSchemes().begin(),
+                                           AllSchemes().end()),
+                         [](const auto& test) {
+                           return std::string(test.param->id());
+                         });
+
 class Recompute : public testing::Test {
  protected:
   static std::shared_ptr<const Binding> RowLeavingTheCube() {
@@ -283,7 +381,7 @@ class Recompute : public testing::Test {
   }
 };
 
-TEST_F(Recompute, GivesWhatWasRounded) {
+TEST_F(Recompute, GivesExtendedPointsTheirExitFaceAgain) {
   const auto binding = RowLeavingTheCube();
   for (const auto& [first, count] :
        {std::pair{0, 900}, {3, 1}, {250, 20}, {899, 1}, {900, 0}}) {

@@ -9,11 +9,8 @@
 // Precision: partition of unity and reproduction of the point to 1e-15 D; next
 //   to the hull, at e D, the single weights of S-CC to 1e-15 / sqrt(e).
 // Cost: 4 to 6 steps of O(n) a point inside, 20 at 1e-6 D from the hull.
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
-#include <utility>
 #include <variant>
 #include <vector>
 
@@ -21,83 +18,13 @@
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
 #include "core/weights/scheme.h"
-#include "core/weights/schemes/celestial_point.h"
+#include "core/weights/schemes/celestial_evaluator.h"
 
 namespace deform {
 namespace {
 
 // Beyond it products with exponents overflow; no one means so much.
 constexpr double kMaxHandleWeight = 1e12;
-
-class CelestialEvaluator final : public WeightEvaluator {
- public:
-  CelestialEvaluator(CelestialKind kind, const Handles& handles,
-                     std::vector<double> s)
-      : kind_(kind),
-        handles_(handles.positions()),
-        s_(std::move(s)),
-        largest_coordinate_(handles_.cwiseAbs().maxCoeff()) {
-    s_.resize(static_cast<size_t>(handles_.rows()), 0.0);
-  }
-
-  void Evaluate(const PositionsRef& points, WeightBlock& block) const override {
-    const int64_t n = points.rows();
-    block.vertex.setZero(n, handles_.rows());
-    block.normal.resize(n, 0);
-    block.states.assign(static_cast<size_t>(n), PointState::kInside);
-    block.iterations.assign(static_cast<size_t>(n), 0);
-    Directions directions;
-    directions.Resize(handles_.rows());
-    WideVec3 start = WideVec3::Zero();
-    for (int64_t i = 0; i < n; ++i) {
-      const std::span<double> row(block.vertex.row(i).data(),
-                                  static_cast<size_t>(handles_.rows()));
-      const Vec3 point = points.row(i);
-      if (!LookFrom(point, directions)) {
-        SitOnHandle(point, row);
-        continue;
-      }
-      const CelestialPoint solved =
-          SolveCelestial(kind_, directions, s_, Uncertainty(point), start, row);
-      start = solved.y;
-      block.states[i] = solved.state;
-      block.iterations[i] =
-          static_cast<uint16_t>(std::min(solved.iterations, 0xffff));
-    }
-  }
-
- private:
-  // Returns false if the point is at a handle.
-  bool LookFrom(const Vec3& point, Directions& directions) const {
-    for (int64_t k = 0; k < handles_.rows(); ++k) {
-      if (!directions.Set(k, handles_.row(k).transpose() - point)) return false;
-    }
-    return true;
-  }
-
-  // Both schemes interpolate. Of coincident handles only the sum is defined:
-  // they share equally.
-  void SitOnHandle(const Vec3& point, std::span<double> row) const {
-    int64_t sharers = 0;
-    for (int64_t k = 0; k < handles_.rows(); ++k) {
-      if (handles_.row(k).transpose() == point) ++sharers;
-    }
-    for (int64_t k = 0; k < handles_.rows(); ++k) {
-      if (handles_.row(k).transpose() == point) row[k] = 1.0 / sharers;
-    }
-  }
-
-  // A point that was computed to lie on the hull is off by so much.
-  double Uncertainty(const Vec3& point) const {
-    return 8 * std::numeric_limits<double>::epsilon() *
-           std::max(largest_coordinate_, point.cwiseAbs().maxCoeff());
-  }
-
-  CelestialKind kind_;
-  Positions handles_;
-  std::vector<double> s_;
-  double largest_coordinate_;
-};
 
 absl::Status CheckHandleWeights(const std::vector<double>& s, int64_t handles) {
   if (s.empty()) return absl::OkStatus();
@@ -152,8 +79,9 @@ class TranslationScheme final : public CoordinateScheme {
     }
     DEFORM_RETURN_IF_ERROR(
         CheckHandleWeights(options.handle_weights, handles->size()));
-    return std::make_unique<CelestialEvaluator>(
-        CelestialKind::kTranslation, *handles, options.handle_weights);
+    return MakeCelestialEvaluator(CelestialKind::kTranslation, *handles,
+                                  options.handle_weights,
+                                  RunnableLaneSolvers().entries[0]);
   }
 };
 
@@ -181,8 +109,8 @@ class ScalingScheme final : public CoordinateScheme {
                                        "; it must be above 1, or 0 for the "
                                        "default (it does not change weights)"));
     }
-    return std::make_unique<CelestialEvaluator>(
-        CelestialKind::kScaling, *handles, std::vector<double>());
+    return MakeCelestialEvaluator(CelestialKind::kScaling, *handles, {},
+                                  RunnableLaneSolvers().entries[0]);
   }
 };
 

@@ -1,0 +1,208 @@
+#include "core/weights/schemes/celestial_evaluator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <new>
+#include <optional>
+#include <span>
+#include <utility>
+
+namespace deform {
+namespace {
+
+// `count` doubles, aligned for any vector.
+class AlignedDoubles {
+ public:
+  explicit AlignedDoubles(int64_t count)
+      : data_(static_cast<double*>(std::aligned_alloc(
+            64,
+            (static_cast<size_t>(count) * sizeof(double) + 63) / 64 * 64))) {
+    if (data_ == nullptr) throw std::bad_alloc();
+    std::fill(data_.get(), data_.get() + count, 0.0);
+  }
+  double* get() const { return data_.get(); }
+  double& operator[](int64_t i) const { return data_.get()[i]; }
+
+ private:
+  struct Free {
+    void operator()(double* data) const { std::free(data); }
+  };
+  std::unique_ptr<double, Free> data_;
+};
+
+// The points of a block along a space-filling curve, so that each is near the
+// one before it, where its search starts.
+std::vector<int32_t> Ordered(const PositionsRef& points) {
+  const Box box = BoxOf(points);
+  const double side = (box.max - box.min).maxCoeff();
+  const double scale = side > 0 ? 1023 / side : 0;
+  // Ten bits of each coordinate, interleaved, above the index.
+  std::vector<uint64_t> keys(static_cast<size_t>(points.rows()));
+  for (int64_t i = 0; i < points.rows(); ++i) {
+    uint32_t key = 0;
+    for (int d = 0; d < 3; ++d) {
+      auto bits = static_cast<uint32_t>((points(i, d) - box.min[d]) * scale);
+      bits = (bits | bits << 16) & 0x030000ff;
+      bits = (bits | bits << 8) & 0x0300f00f;
+      bits = (bits | bits << 4) & 0x030c30c3;
+      bits = (bits | bits << 2) & 0x09249249;
+      key |= bits << d;
+    }
+    keys[i] = uint64_t{key} << 32 | static_cast<uint32_t>(i);
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<int32_t> order(keys.size());
+  for (size_t k = 0; k < keys.size(); ++k) {
+    order[k] = static_cast<int32_t>(keys[k] & 0xffffffff);
+  }
+  return order;
+}
+
+class CelestialEvaluator final : public WeightEvaluator {
+ public:
+  CelestialEvaluator(CelestialKind kind, const Handles& handles,
+                     std::vector<double> s, std::optional<LaneSolver> lanes)
+      : kind_(kind),
+        lanes_(lanes),
+        handles_(handles.positions()),
+        columns_(handles_),
+        s_(std::move(s)),
+        largest_coordinate_(handles_.cwiseAbs().maxCoeff()) {
+    s_.resize(static_cast<size_t>(handles_.rows()), 0.0);
+  }
+
+  void Evaluate(const PositionsRef& points, WeightBlock& block) const override {
+    const int64_t n = points.rows();
+    block.vertex.resize(n, handles_.rows());
+    block.normal.resize(n, 0);
+    block.states.assign(static_cast<size_t>(n), PointState::kInside);
+    block.iterations.assign(static_cast<size_t>(n), 0);
+    if (n == 0) return;
+    const std::vector<int32_t> order = Ordered(points);
+    if (lanes_.has_value()) {
+      EvaluateLanes(points, order, block);
+      return;
+    }
+    Directions directions;
+    directions.Resize(handles_.rows());
+    WideVec3 start = WideVec3::Zero();
+    for (const int32_t i : order) {
+      start = EvaluatePoint(i, points.row(i), start, directions, block);
+    }
+  }
+
+ private:
+  void EvaluateLanes(const PositionsRef& points, std::span<const int32_t> order,
+                     WeightBlock& block) const {
+    const int64_t handles = handles_.rows();
+    const int lanes = lanes_->lanes;
+    const AlignedDoubles scratch(8 * lanes * handles);
+    const AlignedDoubles weights(lanes * handles);
+    const AlignedDoubles solution(3 * lanes);
+    const AlignedDoubles places(3 * lanes);
+    LaneJob job = {.handles = handles,
+                   .x = columns_.col(0).data(),
+                   .y = columns_.col(1).data(),
+                   .z = columns_.col(2).data(),
+                   .s = kind_ == CelestialKind::kScaling ? nullptr : s_.data(),
+                   .points = places.get(),
+                   .scratch = scratch.get(),
+                   .weights = weights.get(),
+                   .solution = solution.get()};
+    Directions directions;
+    directions.Resize(handles);
+    Vec3 start = Vec3::Zero();
+    const auto n = std::ssize(order);
+    for (int64_t first = 0; first < n; first += lanes) {
+      for (int lane = 0; lane < lanes; ++lane) {
+        // The last point fills what is left of its group.
+        const int32_t i = order[std::min(first + lane, n - 1)];
+        for (int d = 0; d < 3; ++d) {
+          places[d * lanes + lane] = points(i, d);
+          solution[d * lanes + lane] = start[d];
+        }
+      }
+      lanes_->solve(job);
+      for (int lane = 0; lane < std::min<int64_t>(lanes, n - first); ++lane) {
+        const int32_t i = order[first + lane];
+        if (job.solved >> lane & 1) {
+          double* row = block.vertex.row(i).data();
+          for (int64_t k = 0; k < handles; ++k) {
+            row[k] = weights[k * lanes + lane];
+          }
+          block.iterations[i] = static_cast<uint16_t>(job.steps);
+          continue;
+        }
+        EvaluatePoint(i, points.row(i), WideVec3::Zero(), directions, block);
+      }
+      // All start where the point just before them ended.
+      const bool solved = job.solved >> (lanes - 1) & 1;
+      for (int d = 0; d < 3; ++d) {
+        start[d] = solved ? solution[d * lanes + lanes - 1] : 0;
+      }
+    }
+  }
+
+  // Returns where the search ended: a start for the next.
+  WideVec3 EvaluatePoint(int64_t i, const Vec3& point, const WideVec3& start,
+                         Directions& directions, WeightBlock& block) const {
+    const std::span<double> row(block.vertex.row(i).data(),
+                                static_cast<size_t>(handles_.rows()));
+    if (!LookFrom(point, directions)) {
+      SitOnHandle(point, row);
+      return WideVec3::Zero();
+    }
+    const CelestialPoint solved =
+        SolveCelestial(kind_, directions, s_, Uncertainty(point), start, row);
+    block.states[i] = solved.state;
+    block.iterations[i] =
+        static_cast<uint16_t>(std::min(solved.iterations, 0xffff));
+    return solved.y;
+  }
+
+  // Returns false if the point is at a handle.
+  bool LookFrom(const Vec3& point, Directions& directions) const {
+    for (int64_t k = 0; k < handles_.rows(); ++k) {
+      if (!directions.Set(k, handles_.row(k).transpose() - point)) return false;
+    }
+    return true;
+  }
+
+  // Both schemes interpolate. Of coincident handles only the sum is defined:
+  // they share equally.
+  void SitOnHandle(const Vec3& point, std::span<double> row) const {
+    int64_t sharers = 0;
+    for (int64_t k = 0; k < handles_.rows(); ++k) {
+      if (handles_.row(k).transpose() == point) ++sharers;
+    }
+    for (int64_t k = 0; k < handles_.rows(); ++k) {
+      row[k] = handles_.row(k).transpose() == point ? 1.0 / sharers : 0;
+    }
+  }
+
+  // A point that was computed to lie on the hull is off by so much.
+  double Uncertainty(const Vec3& point) const {
+    return 8 * std::numeric_limits<double>::epsilon() *
+           std::max(largest_coordinate_, point.cwiseAbs().maxCoeff());
+  }
+
+  CelestialKind kind_;
+  std::optional<LaneSolver> lanes_;
+  Positions handles_;
+  Eigen::Matrix<double, Eigen::Dynamic, 3> columns_;  // The same by columns.
+  std::vector<double> s_;
+  double largest_coordinate_;
+};
+
+}  // namespace
+
+std::unique_ptr<const WeightEvaluator> MakeCelestialEvaluator(
+    CelestialKind kind, const Handles& handles, std::vector<double> s,
+    std::optional<LaneSolver> lanes) {
+  return std::make_unique<CelestialEvaluator>(kind, handles, std::move(s),
+                                              lanes);
+}
+
+}  // namespace deform

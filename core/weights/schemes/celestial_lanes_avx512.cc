@@ -1,0 +1,3 @@
+#define DEFORM_LANES Avx512Lanes
+#define DEFORM_LANE_BYTES 64
+#include "core/weights/schemes/celestial_lanes.inc"

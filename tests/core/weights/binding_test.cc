@@ -348,6 +348,7 @@ TEST_P(BindEvery, SchemeRecomputesWhatWasRounded) {
   const auto binding = Bind(Request(), {});
   ASSERT_TRUE(binding.ok()) << binding.status();
   const int64_t vertices = (*binding)->vertex_count();
+  const auto all = RecomputeWeights(**binding, 0, 642);
   // Ranges that begin and end within, before and after blocks.
   for (const auto& [first, count] :
        {std::pair{0, 642}, {3, 1}, {250, 300}, {641, 1}, {642, 0}}) {
@@ -356,6 +357,7 @@ TEST_P(BindEvery, SchemeRecomputesWhatWasRounded) {
     ASSERT_TRUE(block.ok()) << block.status();
     ASSERT_EQ(block->vertex.rows(), count);
     ASSERT_EQ(block->normal.cols(), (*binding)->normal_count());
+    EXPECT_EQ(block->vertex, all->vertex.middleRows(first, count));
     for (int i = 0; i < count; ++i) {
       for (int k = 0; k < vertices; ++k) {
         EXPECT_EQ((*binding)->weights().at(first + i, k),

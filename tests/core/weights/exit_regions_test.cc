@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 #include <utility>
 #include <vector>
@@ -168,6 +169,76 @@ TEST(AutomaticExit, WorksInThePlane) {
   EXPECT_EQ(exits.parts[0].exit_face, 3);
   EXPECT_THAT(exits.parts[0].crossed_faces, IsEmpty());
   EXPECT_EQ(exits.parts[0].points, OutsidePoints(model, cage));
+}
+
+// A triangle from two points inside to one outside, whose edges cross face f
+// and g at their centroids.
+Shape TriangleThrough(const Cage& cage, int64_t f, int64_t g,
+                      const Vec3& outside) {
+  const CageFaces faces(cage);
+  Shape shape{Positions(3, 3), Faces(1, 3)};
+  shape.faces << 0, 1, 2;
+  shape.positions.row(2) = outside;
+  for (int k = 0; k < 2; ++k) {
+    const CageFaces::Face& face = faces[k == 0 ? f : g];
+    const Vec3 centroid = face.position[0] + face.center;
+    shape.positions.row(k) = centroid + 0.1 * (centroid - outside);
+  }
+  return shape;
+}
+
+int SharedCorners(const CageFaces::Face& f, const CageFaces::Face& g) {
+  int shared = 0;
+  for (int32_t a : f.corner) shared += std::count(g.corner, g.corner + 3, a);
+  return shared;
+}
+
+TEST(AutomaticExit, BreaksATieByTheLowerFace) {
+  const Cage cage = Cube();
+  const std::vector<int32_t> side = Side(cage, {1, 0, 0});
+  for (const bool swap : {false, true}) {
+    const Mesh model =
+        MeshOf(TriangleThrough(cage, side[swap], side[!swap], {2, 0.1, 0.2}));
+    const ExitAssignment exits =
+        Assign(model, cage, {.kind = Kind::kAutomatic});
+    ASSERT_THAT(exits.parts, SizeIs(1));
+    EXPECT_EQ(exits.parts[0].exit_face, side[0]);
+    EXPECT_THAT(exits.parts[0].crossed_faces, ElementsAre(side[1]));
+  }
+}
+
+TEST(AutomaticExit, RefusesToChooseBetweenFacesThatMeetAtACornerOnly) {
+  const Cage cage = Cube();
+  const CageFaces faces(cage);
+  int pairs = 0;
+  for (int64_t f : Side(cage, {1, 0, 0})) {
+    for (int64_t g : Side(cage, {0, 1, 0})) {
+      const Mesh model = MeshOf(TriangleThrough(cage, f, g, {1.5, 1.5, 0.1}));
+      const ExitAssignment exits =
+          Assign(model, cage, {.kind = Kind::kAutomatic});
+      if (SharedCorners(faces[f], faces[g]) == 2) {
+        EXPECT_THAT(exits.parts, SizeIs(1)) << f << " and " << g;
+      } else {
+        EXPECT_THAT(exits.parts, IsEmpty()) << f << " and " << g;
+        ++pairs;
+      }
+    }
+  }
+  EXPECT_GT(pairs, 0);
+}
+
+TEST(AutomaticExit, CountsTheLastFaceThatAnEdgeCrosses) {
+  // A U: edges from its right arm over the gap and through its left arm.
+  const Eigen::Vector2d corners[] = {{0, 0}, {3, 0}, {3, 3}, {2, 3},
+                                     {2, 1}, {1, 1}, {1, 3}, {0, 3}};
+  Shape shape{Positions(3, 3), Faces(1, 3)};
+  shape.positions << 2.5, 2, 0, 2.5, 2.1, 0, -1, 2, 0;
+  shape.faces << 0, 1, 2;
+  const ExitAssignment exits = Assign(MeshOf(shape, 2), CageOf(Loop2d(corners)),
+                                      {.kind = Kind::kAutomatic});
+  ASSERT_THAT(exits.parts, SizeIs(1));
+  EXPECT_EQ(exits.parts[0].exit_face, 7);  // x = 0
+  EXPECT_THAT(exits.parts[0].crossed_faces, IsEmpty());
 }
 
 TEST(AutomaticExit, AcceptsEdgesThatLeaveThroughAnEdgeOrFromTheBoundary) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 #include <random>
+#include <vector>
 
 #include "core/weights/cage_faces.h"
 #include "core/weights/scheme.h"
@@ -125,6 +126,52 @@ TEST_P(GreenIn, FarOutsideEverythingStaysFinite) {
 
 INSTANTIATE_TEST_SUITE_P(Dimension, GreenIn, testing::Values(2, 3),
                          testing::PrintToStringParamName());
+
+// [L08] Eq. 12 of the edge from a to b seen from the origin, as it stands, with
+// eleven bits more to lose.
+struct PlainEdge {
+  long double phi_a, phi_b, psi;
+};
+PlainEdge Plain(long double ax, long double ay, long double bx,
+                long double by) {
+  const long double tx = bx - ax, ty = by - ay, l = std::hypot(tx, ty);
+  const long double x1 = (ax * tx + ay * ty) / l, x2 = (bx * tx + by * ty) / l;
+  const long double h = (ax * by - ay * bx) / l;
+  const long double theta = std::atan2(h * l, ax * bx + ay * by);
+  const long double r1 = std::hypot(ax, ay), r2 = std::hypot(bx, by);
+  const long double lg = std::log(r2 / r1), pi2 = 2 * std::acos(-1.0L);
+  return {(x2 * theta - h * lg) / (pi2 * l), (h * lg - x1 * theta) / (pi2 * l),
+          -(x2 * std::log(r2) - x1 * std::log(r1) - l + h * theta) / pi2};
+}
+
+TEST(GreenIn2d, EdgesShortForTheirDistanceKeepTheirDigits) {
+  // A corner cut off by an edge of 1e-6, seen from 1 to 2 away.
+  const double e = 0x1p-20;
+  const Eigen::Vector2d corners[] = {
+      {-1, -1}, {1, -1}, {1, 1 - e}, {1 - e, 1}, {-1, 1}};
+  const Cage cage = CageOf(Loop2d(corners));
+  const Positions points = DyadicPoints(50, 2) * 0.5;
+  const WeightBlock block = Evaluate(cage, points);
+  for (int64_t i = 0; i < points.rows(); ++i) {
+    std::vector<long double> phi(5), psi(5);
+    for (int a = 0; a < 5; ++a) {
+      const int b = (a + 1) % 5;
+      const PlainEdge edge =
+          Plain(corners[a].x() - points(i, 0), corners[a].y() - points(i, 1),
+                corners[b].x() - points(i, 0), corners[b].y() - points(i, 1));
+      phi[a] += edge.phi_a;
+      phi[b] += edge.phi_b;
+      psi[a] = edge.psi;
+    }
+    // Relative to its own size, too; the plain form in double is 6e-11 off.
+    EXPECT_NEAR(block.normal(i, 2) / psi[2], 1, 1e-11);
+    for (int k = 0; k < 5; ++k) {
+      // What is left of long double after the cancellation: 1e-19 / e.
+      EXPECT_NEAR(block.vertex(i, k), phi[k], 1e-12);
+      EXPECT_NEAR(block.normal(i, k), psi[k], 1e-15);
+    }
+  }
+}
 
 TEST(GreenIn3d, PowersOfTwoChangeNoBitOfTheVertexWeights) {
   const Shape shape = Blob(3);

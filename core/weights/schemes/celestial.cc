@@ -80,8 +80,7 @@ class TranslationScheme final : public CoordinateScheme {
     DEFORM_RETURN_IF_ERROR(
         CheckHandleWeights(options.handle_weights, handles->size()));
     return MakeCelestialEvaluator(CelestialKind::kTranslation, *handles,
-                                  options.handle_weights,
-                                  RunnableLaneSolvers().entries[0]);
+                                  options.handle_weights);
   }
 };
 
@@ -109,8 +108,7 @@ class ScalingScheme final : public CoordinateScheme {
                                        "; it must be above 1, or 0 for the "
                                        "default (it does not change weights)"));
     }
-    return MakeCelestialEvaluator(CelestialKind::kScaling, *handles, {},
-                                  RunnableLaneSolvers().entries[0]);
+    return MakeCelestialEvaluator(CelestialKind::kScaling, *handles, {});
   }
 };
 

@@ -5,9 +5,10 @@
 #include <cstdlib>
 #include <limits>
 #include <new>
-#include <optional>
 #include <span>
 #include <utility>
+
+#include "core/weights/schemes/celestial_lanes.h"
 
 namespace deform {
 namespace {
@@ -63,9 +64,9 @@ std::vector<int32_t> Ordered(const PositionsRef& points) {
 class CelestialEvaluator final : public WeightEvaluator {
  public:
   CelestialEvaluator(CelestialKind kind, const Handles& handles,
-                     std::vector<double> s, std::optional<LaneSolver> lanes)
+                     std::vector<double> s, CelestialWay way)
       : kind_(kind),
-        lanes_(lanes),
+        way_(way),
         handles_(handles.positions()),
         columns_(handles_),
         s_(std::move(s)),
@@ -81,7 +82,7 @@ class CelestialEvaluator final : public WeightEvaluator {
     block.iterations.assign(static_cast<size_t>(n), 0);
     if (n == 0) return;
     const std::vector<int32_t> order = Ordered(points);
-    if (lanes_.has_value()) {
+    if (way_ == CelestialWay::kLanes) {
       EvaluateLanes(points, order, block);
       return;
     }
@@ -97,23 +98,25 @@ class CelestialEvaluator final : public WeightEvaluator {
   void EvaluateLanes(const PositionsRef& points, std::span<const int32_t> order,
                      WeightBlock& block) const {
     const int64_t handles = handles_.rows();
-    const int lanes = lanes_->lanes;
+    const int lanes = CelestialLanes();
     const AlignedDoubles scratch(8 * lanes * handles);
     const AlignedDoubles weights(lanes * handles);
     const AlignedDoubles solution(3 * lanes);
     const AlignedDoubles places(3 * lanes);
-    LaneJob job = {.handles = handles,
-                   .x = columns_.col(0).data(),
-                   .y = columns_.col(1).data(),
-                   .z = columns_.col(2).data(),
-                   .s = kind_ == CelestialKind::kScaling ? nullptr : s_.data(),
-                   .points = places.get(),
-                   .scratch = scratch.get(),
-                   .weights = weights.get(),
-                   .solution = solution.get()};
+    CelestialLaneJob job = {
+        .handles = handles,
+        .x = columns_.col(0).data(),
+        .y = columns_.col(1).data(),
+        .z = columns_.col(2).data(),
+        .s = kind_ == CelestialKind::kScaling ? nullptr : s_.data(),
+        .points = places.get(),
+        .scratch = scratch.get(),
+        .weights = weights.get(),
+        .solution = solution.get()};
     Directions directions;
     directions.Resize(handles);
     Vec3 start = Vec3::Zero();
+    WideVec3 hard = WideVec3::Zero();  // Where the last plain search ended.
     const auto n = std::ssize(order);
     for (int64_t first = 0; first < n; first += lanes) {
       for (int lane = 0; lane < lanes; ++lane) {
@@ -124,7 +127,7 @@ class CelestialEvaluator final : public WeightEvaluator {
           solution[d * lanes + lane] = start[d];
         }
       }
-      lanes_->solve(job);
+      SolveCelestialLanes(job);
       for (int lane = 0; lane < std::min<int64_t>(lanes, n - first); ++lane) {
         const int32_t i = order[first + lane];
         if (job.solved >> lane & 1) {
@@ -135,7 +138,7 @@ class CelestialEvaluator final : public WeightEvaluator {
           block.iterations[i] = static_cast<uint16_t>(job.steps);
           continue;
         }
-        EvaluatePoint(i, points.row(i), WideVec3::Zero(), directions, block);
+        hard = EvaluatePoint(i, points.row(i), hard, directions, block);
       }
       // All start where the point just before them ended.
       const bool solved = job.solved >> (lanes - 1) & 1;
@@ -189,7 +192,7 @@ class CelestialEvaluator final : public WeightEvaluator {
   }
 
   CelestialKind kind_;
-  std::optional<LaneSolver> lanes_;
+  CelestialWay way_;
   Positions handles_;
   Eigen::Matrix<double, Eigen::Dynamic, 3> columns_;  // The same by columns.
   std::vector<double> s_;
@@ -200,9 +203,8 @@ class CelestialEvaluator final : public WeightEvaluator {
 
 std::unique_ptr<const WeightEvaluator> MakeCelestialEvaluator(
     CelestialKind kind, const Handles& handles, std::vector<double> s,
-    std::optional<LaneSolver> lanes) {
-  return std::make_unique<CelestialEvaluator>(kind, handles, std::move(s),
-                                              lanes);
+    CelestialWay way) {
+  return std::make_unique<CelestialEvaluator>(kind, handles, std::move(s), way);
 }
 
 }  // namespace deform

@@ -3,19 +3,21 @@
 // digits (outside, next to the hull, at a handle); those go the plain way
 // (celestial_point.h), which also judges it.
 //
-// Pointers and counts only: celestial_lanes.inc is compiled for several
-// instruction sets and must not share inline functions with other files.
+// Pointers and counts only.
 #pragma once
 
 #include <cstdint>
 
 namespace deform {
 
-inline constexpr int kMaxLanes = 8;
+inline constexpr int kMaxCelestialLanes = 8;
 
-// One group of points, as many as the solver has lanes (L). Arrays are aligned
-// to 64 bytes.
-struct LaneJob {
+// Points that one call solves: L, at most kMaxCelestialLanes. Depends on the
+// machine.
+int CelestialLanes();
+
+// One group of L points. Arrays are aligned to 64 bytes.
+struct CelestialLaneJob {
   // n handles; `s` are the user weights of T-CC, null for S-CC.
   int64_t handles;
   const double* x;
@@ -32,17 +34,6 @@ struct LaneJob {
   int steps;  // Newton steps.
 };
 
-struct LaneSolver {
-  const char* name;  // Of the instruction set.
-  int lanes;         // L, at most kMaxLanes.
-  void (*solve)(LaneJob& job);
-};
-
-// Those that this machine can run, the fastest first.
-struct LaneSolvers {
-  LaneSolver entries[3];
-  int count;
-};
-LaneSolvers RunnableLaneSolvers();
+void SolveCelestialLanes(CelestialLaneJob& job);
 
 }  // namespace deform

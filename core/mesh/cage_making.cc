@@ -1,0 +1,209 @@
+// A surface around the model at the margin r, decimated as long as it keeps
+// clear of the model.
+//
+// Distances change by at most the way gone, so a triangle whose samples, half a
+// margin apart, are 0.35 r away from the model is nowhere closer than about
+// r / 20 in the worst case. A surface that never touches the model keeps it on
+// the same side, which the winding number confirms in the end.
+#include "core/mesh/cage_making.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/error.h"
+#include "core/base/status_macros.h"
+#include "core/mesh/distance_grid.h"
+#include "core/mesh/offset_surface.h"
+#include "core/mesh/self_intersection.h"
+#include "core/mesh/topology.h"
+#include "core/mesh/triangle.h"
+#include "core/mesh/winding.h"
+
+namespace deform {
+namespace {
+
+// In margins.
+constexpr double kSpacing = 0.5;
+constexpr double kPadding = 2.5;
+constexpr double kClearance = 0.35;
+
+// Bounds on the shape of faces. Between long sides nothing can bend, so they
+// are kept below this many times the side of an even triangulation.
+constexpr double kLongestSide = 2;
+constexpr double kMinRoundness = 0.2;
+
+absl::Status CheckOptions(const Mesh& model, const CageMakingOptions& options) {
+  if (model.dimension() != 3) {
+    return InvalidInput("WRONG_DIMENSION", "",
+                        "cages are made for 3D models only");
+  }
+  if (options.target_faces < 8 || options.target_faces > 20000) {
+    return InvalidInput(
+        "INVALID_OPTION", "target_faces",
+        absl::StrCat("the number of faces to aim at must be between 8 and "
+                     "20000, not ",
+                     options.target_faces));
+  }
+  if (!(options.margin >= 0.01 && options.margin <= 1)) {
+    return InvalidInput("INVALID_OPTION", "margin",
+                        absl::StrCat("the margin must be between 0.01 and 1 "
+                                     "diagonals of the model, not ",
+                                     options.margin));
+  }
+  if (!(model.box().diagonal() > 0)) {
+    return InvalidInput("MODEL_WITHOUT_EXTENT", "",
+                        "all points of the model are at one place");
+  }
+  return absl::OkStatus();
+}
+
+double LongestSide(const Vec3& a, const Vec3& b, const Vec3& c) {
+  return std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+}
+
+// Whether the triangle keeps `clearance`, by samples at most `step` apart.
+bool KeepsClear(const DistanceGrid& grid, double clearance, double step,
+                const Vec3& a, const Vec3& b, const Vec3& c) {
+  const int steps =
+      std::max(2, static_cast<int>(std::ceil(LongestSide(a, b, c) / step)));
+  const Vec3 ab = (b - a) / steps;
+  const Vec3 ac = (c - a) / steps;
+  for (int i = 0; i <= steps; ++i) {
+    for (int j = 0; i + j <= steps; ++j) {
+      if (!(grid.At(a + i * ab + j * ac) >= clearance)) return false;
+    }
+  }
+  return true;
+}
+
+// Height over longest side, in parts of what an equilateral triangle has.
+double Roundness(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const double longest = LongestSide(a, b, c);
+  return AreaVector(a, b, c).norm() / (longest * longest) / (std::sqrt(3) / 2);
+}
+
+// Side of an equilateral triangle with one of `count` parts of the area.
+double MeanSide(const TriangleSurface& surface, int count) {
+  double area = 0;
+  for (const auto& face : surface.faces.rowwise()) {
+    area += AreaVector(surface.positions.row(face[0]),
+                       surface.positions.row(face[1]),
+                       surface.positions.row(face[2]))
+                .norm() /
+            2;
+  }
+  return std::sqrt(4 / std::sqrt(3) * area / count);
+}
+
+// Moves each vertex half way to the mean of its neighbours, a few times:
+// marching leaves thin triangles that decimation could not get rid of.
+void Relax(TriangleSurface& surface) {
+  constexpr int kPasses = 5;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    Positions sums = Positions::Zero(surface.positions.rows(), 3);
+    Eigen::VectorXd counts = Eigen::VectorXd::Zero(surface.positions.rows());
+    for (const auto& face : surface.faces.rowwise()) {
+      for (int k = 0; k < 3; ++k) {
+        // Every edge is seen from both of its faces, once each way.
+        sums.row(face[k]) += surface.positions.row(face[(k + 1) % 3]);
+        counts[face[k]] += 1;
+      }
+    }
+    const Positions means = (sums.array().colwise() / counts.array()).matrix();
+    surface.positions = 0.5 * (surface.positions + means);
+  }
+}
+
+// The model in a box of diagonal 1 around the origin.
+Positions Normalized(const Mesh& model) {
+  return (model.positions().rowwise() - model.box().center().transpose()) /
+         model.box().diagonal();
+}
+
+bool EnclosesAll(const TriangleSurface& surface, const Positions& positions) {
+  for (const auto& row : positions.rowwise()) {
+    const double winding =
+        WindingNumber(surface.positions, surface.faces, row.transpose());
+    if (!(std::abs(winding - 1) < 0.5)) return false;
+  }
+  return true;
+}
+
+class Maker {
+ public:
+  Maker(const Mesh& model, double margin)
+      : positions_(Normalized(model)),
+        margin_(margin),
+        grid_(positions_, model.faces(), kSpacing * margin, kPadding * margin),
+        offset_(OffsetSurface(grid_, margin)) {
+    Relax(offset_);
+  }
+
+  // Nullopt if the surface runs through itself or does not hold the model.
+  std::optional<TriangleSurface> Make(int target_faces) const {
+    const double longest = kLongestSide * MeanSide(offset_, target_faces);
+    TriangleSurface surface =
+        Decimate(offset_, target_faces,
+                 [&](const Vec3& a, const Vec3& b, const Vec3& c) {
+                   return LongestSide(a, b, c) <= longest &&
+                          Roundness(a, b, c) >= kMinRoundness &&
+                          KeepsClear(grid_, kClearance * margin_,
+                                     kSpacing * margin_, a, b, c);
+                 });
+    if (FindSelfIntersection(surface.positions, surface.faces)) {
+      return std::nullopt;
+    }
+    if (!EnclosesAll(surface, positions_)) return std::nullopt;
+    return surface;
+  }
+
+ private:
+  Positions positions_;
+  double margin_;
+  DistanceGrid grid_;
+  TriangleSurface offset_;
+};
+
+// The surface with the fewest faces of several attempts; the first one that
+// comes near the target ends them.
+std::optional<TriangleSurface> FindSurface(const Mesh& model,
+                                           const CageMakingOptions& options) {
+  std::optional<TriangleSurface> best;
+  for (const double widening : {1.0, 1.4, 2.0, 3.0}) {
+    const Maker maker(model, widening * options.margin);
+    for (const double more : {1.0, 1.5, 2.0}) {
+      const int target = static_cast<int>(more * options.target_faces);
+      auto surface = maker.Make(target);
+      if (!surface) continue;
+      if (!best || surface->faces.rows() < best->faces.rows()) {
+        best = std::move(surface);
+      }
+      if (best->faces.rows() <= 2 * options.target_faces) return best;
+      break;
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+absl::StatusOr<Cage> MakeCage(const Mesh& model,
+                              const CageMakingOptions& options) {
+  DEFORM_RETURN_IF_ERROR(CheckOptions(model, options));
+  std::optional<TriangleSurface> surface = FindSurface(model, options);
+  if (!surface) {
+    return MakeError(absl::StatusCode::kFailedPrecondition,
+                     "no cage was found that encloses the model without "
+                     "running through itself; more faces or another margin may "
+                     "help",
+                     {.reason = "NO_CAGE_FOUND"});
+  }
+  Positions vertices = surface->positions * model.box().diagonal();
+  vertices.rowwise() += model.box().center().transpose();
+  return Cage::Create(3, std::move(vertices), std::move(surface->faces));
+}
+
+}  // namespace deform

@@ -1,0 +1,123 @@
+#include "core/mesh/cage_making.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/base/error.h"
+#include "core/mesh/self_intersection.h"
+#include "core/mesh/triangle.h"
+#include "tests/support/shapes.h"
+
+namespace deform {
+namespace {
+
+using testing::HasSubstr;
+
+// Coarser than the default, to be quick.
+constexpr CageMakingOptions kOptions{.target_faces = 120, .margin = 0.08};
+
+double Distance(const Shape& surface, const Vec3& point) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const auto& face : surface.faces.rowwise()) {
+    const Vec3 on_face = ClosestOnTriangle(
+        point, surface.positions.row(face[0]), surface.positions.row(face[1]),
+        surface.positions.row(face[2]));
+    nearest = std::min(nearest, (on_face - point).norm());
+  }
+  return nearest;
+}
+
+struct Model {
+  std::string name;
+  Shape shape;
+  // Vertices - edges + faces of the cage: 2 a sphere, 0 a torus.
+  int euler;
+};
+
+class MadeCage : public testing::TestWithParam<Model> {};
+
+TEST_P(MadeCage, EnclosesTheModelClosely) {
+  const Shape& shape = GetParam().shape;
+  const Mesh model = MeshOf(shape);
+  const auto cage = MakeCage(model, kOptions);
+  ASSERT_TRUE(cage.ok()) << cage.status();
+  EXPECT_LE(cage->face_count(), 2 * kOptions.target_faces);
+  EXPECT_EQ(cage->vertex_count() - cage->face_count() / 2, GetParam().euler);
+  EXPECT_FALSE(FindSelfIntersection(cage->vertices(), cage->faces()));
+
+  const double margin = kOptions.margin * model.box().diagonal();
+  const Shape surface{cage->vertices(), cage->faces()};
+  for (const auto& row : model.positions().rowwise()) {
+    const Vec3 point = row;
+    EXPECT_NEAR(WindingNumber(*cage, point), 1, 1e-9);
+    EXPECT_GE(Distance(surface, point), margin / 4);
+  }
+  // The margin may have been widened threefold, not more.
+  if (shape.faces.rows() == 0) return;
+  for (const auto& row : cage->vertices().rowwise()) {
+    EXPECT_LE(Distance(shape, row), 3.1 * margin);
+  }
+}
+
+Shape PointsOnly(Shape shape) {
+  shape.faces.resize(0, 3);
+  return shape;
+}
+
+Shape Moved(Shape shape, double scale, const Vec3& offset) {
+  shape.positions *= scale;
+  shape.positions.rowwise() += offset.transpose();
+  return shape;
+}
+
+const Shape kSphere = Icosphere(1, 2);
+
+INSTANTIATE_TEST_SUITE_P(
+    CageMaking, MadeCage,
+    testing::ValuesIn<Model>({
+        {"Sphere", kSphere, 2},
+        {"Torus", Torus(2, 0.4, 32, 12), 0},
+        {"OpenTube", Tube(0.3, 4, 16, 20), 2},
+        {"Bar", Bar({0, 0, 0}, {1, 1, 4}, std::array{3, 3, 8}), 2},
+        // Thinner than any lattice, and open.
+        {"Sheet", Grid2d(12), 2},
+        {"PointSet", PointsOnly(kSphere), 2},
+        {"HollowWithCore", Joined(kSphere, Scaled(kSphere, 0.2)), 2},
+        {"TwoParts", Joined(kSphere, Scaled(kSphere, 1, {0, 4, 0})), 4},
+        {"InsideOut", Turned(kSphere), 2},
+        {"FarAway", Moved(kSphere, 1e-3, {1e4, -1e4, 0}), 2},
+        {"Huge", Moved(kSphere, 1e30, {0, 0, 0}), 2},
+        {"SingleTriangle",
+         {Tetrahedron().positions.topRows(3), Tetrahedron().faces.topRows(1)},
+         2},
+    }),
+    [](const auto& test) { return test.param.name; });
+
+void ExpectRefused(const Mesh& model, const CageMakingOptions& options,
+                   const std::string& reason, const std::string& message) {
+  const auto cage = MakeCage(model, options);
+  EXPECT_EQ(DetailOf(cage.status()).reason, reason);
+  EXPECT_THAT(std::string(cage.status().message()), HasSubstr(message));
+}
+
+TEST(CageMaking, RefusesWhatItCannotDo) {
+  const Mesh model = MeshOf(kSphere);
+  ExpectRefused(model, {.target_faces = 7}, "INVALID_OPTION",
+                "between 8 and 20000, not 7");
+  ExpectRefused(model, {.target_faces = 20001}, "INVALID_OPTION", "not 20001");
+  ExpectRefused(model, {.margin = 0.001}, "INVALID_OPTION",
+                "between 0.01 and 1 diagonals of the model, not 0.001");
+  ExpectRefused(model, {.margin = std::numeric_limits<double>::quiet_NaN()},
+                "INVALID_OPTION", "not nan");
+  ExpectRefused(MeshOf(Grid2d(2), 2), {}, "WRONG_DIMENSION", "3D models only");
+  ExpectRefused(MeshOf({Positions::Ones(3, 3), Faces(0, 3)}), {},
+                "MODEL_WITHOUT_EXTENT", "all points of the model are at one");
+}
+
+}  // namespace
+}  // namespace deform

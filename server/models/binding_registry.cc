@@ -144,18 +144,22 @@ absl::StatusOr<std::shared_ptr<BindingRegistry::Job>> BindingRegistry::MakeJob(
 void BindingRegistry::StartJobs() {
   while (running_ < limits_.concurrent && !queue_.empty()) {
     ++running_;
-    pool_.Submit([this, job = queue_.front()] { Run(job); });
+    pool_.Submit([this, job = std::move(queue_.front())]() mutable {
+      Run(std::move(job));
+    });
     queue_.pop_front();
   }
 }
 
-void BindingRegistry::Run(const std::shared_ptr<Job>& job) {
+void BindingRegistry::Run(std::shared_ptr<Job> job) {
   absl::StatusOr<CreatedBinding> outcome = Compute(*job);
   MutexLock lock(mutex_);
   job->outcome = std::move(outcome);
   // Another may have taken the place of a cancelled job.
   const auto found = jobs_.find(job->key);
   if (found != jobs_.end() && found->second == job) jobs_.erase(found);
+  // The registry may go as soon as nothing runs, and a job holds parts of it.
+  job.reset();
   --running_;
   StartJobs();
   changed_.NotifyAll();

@@ -117,7 +117,7 @@ class BindingRegistry {
   void StartJobs() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Abandon(const std::shared_ptr<Job>& job)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void Run(const std::shared_ptr<Job>& job);
+  void Run(std::shared_ptr<Job> job);
   absl::StatusOr<CreatedBinding> Compute(Job& job);
 
   const Limits limits_;

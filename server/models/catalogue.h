@@ -168,7 +168,7 @@ class Catalogue {
                      absl::StrCat("no ", type_, " ", Quoted(id)),
                      {.reason = absl::StrCat(Type(), "_NOT_FOUND"),
                       .resource_type = type_,
-                      .resource_name = id.substr(0, kMaxNameBytes)});
+                      .resource_name = Printable(id)});
   }
 
   absl::Status InUse(const std::string& id,

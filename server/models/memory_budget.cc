@@ -14,7 +14,7 @@ std::string FormatBytes(int64_t bytes) {
     value /= 1024;
     ++unit;
   }
-  return absl::StrFormat("%.3g %s", value, kUnits[unit]);
+  return absl::StrFormat("%.4g %s", value, kUnits[unit]);
 }
 
 MemoryBudget::Reservation::~Reservation() {

@@ -10,10 +10,14 @@
 
 namespace deform::server {
 
-std::string Quoted(absl::string_view name) {
+std::string Printable(absl::string_view name) {
   const bool cut = name.size() > kMaxNameBytes;
-  return absl::StrCat("\"", absl::CHexEscape(name.substr(0, kMaxNameBytes)),
-                      cut ? "...\"" : "\"");
+  return absl::StrCat(absl::CHexEscape(name.substr(0, kMaxNameBytes)),
+                      cut ? "..." : "");
+}
+
+std::string Quoted(absl::string_view name) {
+  return absl::StrCat("\"", Printable(name), "\"");
 }
 
 absl::Status CheckName(absl::string_view name, absl::string_view field) {

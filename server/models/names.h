@@ -12,7 +12,9 @@ namespace deform::server {
 inline constexpr int kMaxNameBytes = 64;
 inline constexpr int kMaxDisplayNameBytes = 256;
 
-// A name as it may stand in a message: cut and escaped.
+// A name from outside as it may be told to others: cut, and escaped to ASCII.
+std::string Printable(absl::string_view name);
+// The same in quotes, for messages.
 std::string Quoted(absl::string_view name);
 
 // InvalidArgument BAD_NAME, about `field`, unless `name` is 1 to 64 of

@@ -194,6 +194,7 @@ absl::StatusOr<BindSpec> FromProto(const v1::CreateBindingRequest& request) {
     return InvalidInput("MISSING_FIELD", "scheme",
                         "scheme is an id of ListSchemes, such as green");
   }
+  DEFORM_RETURN_IF_ERROR(CheckName(request.scheme(), "scheme"));
   if (!v1::Unbindable_IsValid(request.unbindable())) {
     return UnknownValue("unbindable", request.unbindable());
   }

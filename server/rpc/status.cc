@@ -2,9 +2,11 @@
 
 #include <string>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "core/base/error.h"
 #include "google/rpc/error_details.pb.h"
+#include "server/models/names.h"
 
 namespace deform::server {
 namespace {
@@ -12,12 +14,10 @@ namespace {
 constexpr char kDomain[] = "deformd";
 
 // Cut between characters: Protobuf strings are UTF-8.
-std::string Message(const absl::Status& status) {
-  absl::string_view message = status.message();
-  if (message.size() <= kMaxMessageBytes) return std::string(message);
-  size_t end = kMaxMessageBytes;
-  while (end > 0 && (message[end] & 0xC0) == 0x80) --end;
-  return std::string(message.substr(0, end)) + "...";
+std::string Cut(absl::string_view text, size_t size) {
+  if (text.size() <= size) return std::string(text);
+  while (size > 0 && (text[size] & 0xC0) == 0x80) --size;
+  return absl::StrCat(text.substr(0, size), "...");
 }
 
 void AddDetails(const absl::Status& status, const std::string& message,
@@ -48,7 +48,7 @@ void AddDetails(const absl::Status& status, const std::string& message,
   if (!detail.resource_type.empty()) {
     google::rpc::ResourceInfo resource;
     resource.set_resource_type(detail.resource_type);
-    resource.set_resource_name(detail.resource_name);
+    resource.set_resource_name(Cut(detail.resource_name, kMaxNameBytes));
     rpc.add_details()->PackFrom(resource);
   }
   if (status.code() == absl::StatusCode::kUnavailable) {
@@ -64,7 +64,7 @@ google::rpc::Status ToRpcStatus(const absl::Status& status) {
   google::rpc::Status rpc;
   rpc.set_code(static_cast<int>(status.code()));
   if (status.ok()) return rpc;
-  const std::string message = Message(status);
+  const std::string message = Cut(status.message(), kMaxMessageBytes);
   rpc.set_message(message);
   AddDetails(status, message, rpc);
   return rpc;

@@ -1,0 +1,172 @@
+// Sessions without a socket: steps run when told, time passes when told.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/frames/encoding.h"
+#include "server/models/binding_registry.h"
+#include "server/models/model_registry.h"
+#include "server/sessions/session.h"
+#include "tests/support/shapes.h"
+
+namespace deform::server {
+
+// Runs tasks one by one, on the caller's thread.
+class ManualExecutor {
+ public:
+  Executor executor() {
+    return [this](std::function<void()> task) {
+      tasks_.push_back(std::move(task));
+    };
+  }
+  bool RunOne() {
+    if (tasks_.empty()) return false;
+    const auto task = std::move(tasks_.front());
+    tasks_.pop_front();
+    task();
+    return true;
+  }
+  // How many tasks ran.
+  int RunAll() {
+    int count = 0;
+    while (RunOne()) ++count;
+    return count;
+  }
+  size_t waiting() const { return tasks_.size(); }
+
+ private:
+  std::deque<std::function<void()>> tasks_;
+};
+
+class ManualClock {
+ public:
+  Clock clock() {
+    return [this] { return now_; };
+  }
+  void Advance(std::chrono::milliseconds time) { now_ += time; }
+
+ private:
+  std::chrono::steady_clock::time_point now_{};
+};
+
+class CountingReceiver : public Receiver {
+ public:
+  void Wake() override { ++wakes; }
+  int wakes = 0;
+};
+
+// A stream that takes what it is told to.
+struct FakeStream {
+  std::shared_ptr<CountingReceiver> receiver =
+      std::make_shared<CountingReceiver>();
+  std::unique_ptr<Participant> participant;
+  SessionState joined;
+  Pose pose;
+
+  FrameToSend TakeFrame() {
+    const auto next = participant->Take();
+    if (!next || !std::holds_alternative<FrameToSend>(*next)) {
+      ADD_FAILURE() << "no frame";
+      return {};
+    }
+    return std::get<FrameToSend>(*next);
+  }
+  absl::Status TakeEnd() {
+    const auto next = participant->Take();
+    if (!next || !std::holds_alternative<Ended>(*next)) {
+      ADD_FAILURE() << "no end";
+      return absl::UnknownError("no end");
+    }
+    return std::get<Ended>(*next).status;
+  }
+};
+
+// A ball of 42 points in a cube.
+inline constexpr int64_t kBallPoints = 42;
+inline Cage BallCage() {
+  return CageOf(Cuboid(Vec3::Constant(-1), Vec3::Constant(1)));
+}
+
+// One binding of tenant "t" and what sessions of it need.
+class SessionRooms {
+ public:
+  SessionRooms() {
+    BindSpec spec{
+        .tenant = "t",
+        .model_id = models_.Register("t", "", MeshOf(Icosphere(0.5, 1)))
+                        .value()
+                        .record->id,
+        .rig = BallCage(),
+        .scheme = "green"};
+    const auto waiter = bindings_.Create(std::move(spec)).value();
+    binding_id =
+        waiter->Wait(std::chrono::minutes(1)).value().value().record->id;
+  }
+
+  SessionEnvironment Environment() {
+    return {.executor = executor.executor(),
+            .clock = clock.clock(),
+            .max_participants = 3,
+            .stall_timeout = std::chrono::seconds(10)};
+  }
+  BindingCatalogue& bindings() { return bindings_.catalogue(); }
+
+  std::string binding_id;
+
+ private:
+  static constexpr ModelRegistry::Limits kModelLimits = {
+      .model_bytes = 1 << 20, .memory = 1 << 20, .count = 10};
+  static constexpr BindingRegistry::Limits kBindingLimits = {
+      .memory = 1 << 20, .count = 10, .concurrent = 1, .waiting_calls = 1};
+
+  ThreadPool pool_{{.threads = 1}};
+  ModelRegistry models_{kModelLimits};
+  BindingRegistry bindings_{models_, pool_, kBindingLimits};
+
+ public:
+  ManualClock clock;
+  // The steps it holds hold sessions: it goes first.
+  ManualExecutor executor;
+};
+
+// The whole cage moved.
+inline PoseUpdate MovedBy(const Vec3& offset) {
+  Positions vertices = BallCage().vertices();
+  vertices.rowwise() += offset.transpose();
+  return {.positions = vertices};
+}
+
+inline PoseUpdate MoveVertex(int32_t vertex, const Vec3& to) {
+  Positions position = to.transpose();
+  return {.vertices = {vertex}, .positions = position};
+}
+
+// What the chunks of a frame say, back in model units: N x 3.
+inline Positions Decoded(const Frame& frame) {
+  std::vector<float> all;
+  for (const Frame::Chunk& chunk : frame.chunks) {
+    std::vector<float> part(chunk.vertex_count * frame.dimension);
+    EXPECT_TRUE(
+        frame.encoding
+            ->Decode({chunk.bytes.get(), static_cast<size_t>(chunk.size)},
+                     frame.dimension, part)
+            .ok());
+    all.insert(all.end(), part.begin(), part.end());
+  }
+  Positions positions =
+      Positions::Zero(static_cast<int64_t>(all.size()) / frame.dimension, 3);
+  for (int64_t i = 0; i < positions.rows(); ++i) {
+    for (int c = 0; c < frame.dimension; ++c) {
+      positions(i, c) = frame.info.origin[c] + all[i * frame.dimension + c];
+    }
+  }
+  return positions;
+}
+
+}  // namespace deform::server

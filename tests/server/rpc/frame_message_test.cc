@@ -1,0 +1,108 @@
+#include "server/rpc/frame_message.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "deform/v1/session.pb.h"
+#include "server/rpc/message_bytes.h"
+
+namespace deform::server {
+namespace {
+
+// Two chunks of 2 and 1 vertices.
+std::shared_ptr<Frame> TwoChunks() {
+  auto frame = std::make_shared<Frame>();
+  frame->info = {.revision = 300,
+                 .origin = {1, 2, 3},
+                 .columns_applied = 20,
+                 .exit_mismatch = 0.5,
+                 .deform_time = std::chrono::microseconds(77)};
+  frame->encoding = FindEncoding("float32");
+  for (const int64_t vertices : {2, 1}) {
+    Frame::Chunk chunk{.first_vertex = vertices == 2 ? 0 : 2,
+                       .vertex_count = vertices,
+                       .size = vertices * 12};
+    chunk.bytes = std::make_unique<uint8_t[]>(chunk.size);
+    std::memset(chunk.bytes.get(), static_cast<int>(vertices), chunk.size);
+    frame->chunks.push_back(std::move(chunk));
+  }
+  return frame;
+}
+
+v1::FrameChunk Parsed(const FrameToSend& send, size_t chunk) {
+  v1::DeformResponse response;
+  EXPECT_TRUE(ParseMessage(FrameMessage(send, chunk, 4), response));
+  EXPECT_TRUE(response.has_frame());
+  EXPECT_EQ(response.GetReflection()->GetUnknownFields(response).field_count(),
+            0);
+  return response.frame();
+}
+
+TEST(FrameMessage, IsAValidMessage) {
+  const FrameToSend send{.frame = TwoChunks(),
+                         .answers_sequence = 9,
+                         .skipped_revisions = 2,
+                         .keyframe = true};
+  const v1::FrameChunk first = Parsed(send, 0);
+  EXPECT_EQ(first.revision(), 300u);
+  EXPECT_EQ(first.epoch(), 4u);
+  EXPECT_EQ(first.answers_sequence(), 9u);
+  EXPECT_EQ(first.encoding(), "float32");
+  EXPECT_TRUE(first.keyframe());
+  ASSERT_EQ(first.origin_size(), 3);
+  EXPECT_EQ(first.origin(2), 3);
+  EXPECT_EQ(first.first_vertex(), 0u);
+  EXPECT_EQ(first.vertex_count(), 2u);
+  EXPECT_FALSE(first.last());
+  EXPECT_EQ(first.skipped_revisions(), 2u);
+  EXPECT_EQ(first.columns_applied(), 20u);
+  EXPECT_EQ(first.exit_mismatch(), 0.5);
+  EXPECT_EQ(first.deform_us(), 77u);
+  EXPECT_EQ(first.data(), std::string(24, '\2'));
+}
+
+TEST(FrameMessage, LaterChunksSayOnlyWhatIsTheirs) {
+  const FrameToSend send{
+      .frame = TwoChunks(), .skipped_revisions = 2, .keyframe = true};
+  const v1::FrameChunk last = Parsed(send, 1);
+  EXPECT_TRUE(last.last());
+  EXPECT_TRUE(last.keyframe());
+  EXPECT_EQ(last.origin_size(), 0);
+  EXPECT_EQ(last.skipped_revisions(), 0u);
+  EXPECT_EQ(last.first_vertex(), 2u);
+  EXPECT_EQ(last.data(), std::string(12, '\1'));
+}
+
+TEST(FrameMessage, TellsNoOriginWithoutAKeyframe) {
+  EXPECT_EQ(Parsed({.frame = TwoChunks()}, 0).origin_size(), 0);
+}
+
+TEST(FrameMessage, DoesNotCopyTheData) {
+  const auto frame = TwoChunks();
+  const grpc::ByteBuffer message = FrameMessage({.frame = frame}, 0, 1);
+  std::vector<grpc::Slice> slices;
+  ASSERT_TRUE(message.Dump(&slices).ok());
+  EXPECT_EQ(slices.back().begin(), frame->chunks[0].bytes.get());
+}
+
+TEST(FrameMessage, KeepsTheFrameUntilItIsSent) {
+  auto frame = TwoChunks();
+  const std::weak_ptr<Frame> alive = frame;
+  {
+    const grpc::ByteBuffer message = FrameMessage({.frame = frame}, 0, 1);
+    frame.reset();
+    EXPECT_FALSE(alive.expired());
+  }
+  EXPECT_TRUE(alive.expired());
+}
+
+TEST(MessageBytes, RefusesWhatIsNoMessage) {
+  const grpc::Slice slice(std::string("\xff\xff\xff"));
+  v1::DeformRequest request;
+  EXPECT_FALSE(ParseMessage(grpc::ByteBuffer(&slice, 1), request));
+  EXPECT_TRUE(ParseMessage(SerializeMessage(v1::DeformRequest()), request));
+}
+
+}  // namespace
+}  // namespace deform::server

@@ -39,7 +39,9 @@ struct NewtonSolution {
 };
 
 // q_i . y
-inline double Exponent(const Directions& q, int64_t i, const WideVec3& y) {
+template <class Real>
+double Exponent(const Directions& q, int64_t i,
+                const Eigen::Matrix<Real, 3, 1>& y) {
   return static_cast<double>(q.x[i] * y.x() + q.y[i] * y.y() + q.z[i] * y.z());
 }
 

@@ -204,14 +204,15 @@ absl::StatusOr<WeightRows> FromProto(const v1::GetWeightsResponse& weights) {
   return rows;
 }
 
-absl::StatusOr<Joined> FromProto(const v1::Joined& joined) {
-  Joined result{.session_id = joined.session().session_id(),
-                .binding_id = joined.session().binding_id(),
-                .encoding = joined.encoding(),
-                .dimension = static_cast<int>(joined.dimension()),
-                .point_count = static_cast<int64_t>(joined.point_count()),
-                .vertex_count = joined.vertex_count(),
-                .revision = joined.session().revision()};
+absl::StatusOr<JoinedSession> FromProto(const v1::Joined& joined) {
+  JoinedSession result{
+      .session_id = joined.session().session_id(),
+      .binding_id = joined.session().binding_id(),
+      .encoding = joined.encoding(),
+      .dimension = static_cast<int>(joined.dimension()),
+      .point_count = static_cast<int64_t>(joined.point_count()),
+      .vertex_count = joined.vertex_count(),
+      .revision = joined.session().revision()};
   DEFORM_ASSIGN_OR_RETURN(result.pose.vertices,
                           ReadRows(joined.pose(), result.dimension));
   if (result.pose.vertices.rows() != result.vertex_count) {

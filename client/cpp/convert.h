@@ -19,7 +19,7 @@ SchemeInfo FromProto(const v1::Scheme& scheme);
 // InvalidArgument (BAD_ANSWER) if the numbers do not fit together.
 absl::StatusOr<RigArrays> FromProto(const v1::Rig& rig);
 absl::StatusOr<WeightRows> FromProto(const v1::GetWeightsResponse& weights);
-absl::StatusOr<Joined> FromProto(const v1::Joined& joined);
+absl::StatusOr<JoinedSession> FromProto(const v1::Joined& joined);
 
 // `tenant` and `model_id` included.
 v1::CreateBindingRequest ToProto(const BindingSpec& spec,

@@ -108,7 +108,7 @@ DeformStream::DeformStream(DeformStream&&) noexcept = default;
 DeformStream& DeformStream::operator=(DeformStream&&) noexcept = default;
 DeformStream::~DeformStream() = default;
 
-const Joined& DeformStream::joined() const { return impl_->joined(); }
+const JoinedSession& DeformStream::joined() const { return impl_->joined(); }
 absl::StatusOr<uint64_t> DeformStream::Send(const PoseUpdate& update) {
   return impl_->Send(update);
 }

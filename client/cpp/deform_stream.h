@@ -47,7 +47,7 @@ struct Frame {
 };
 
 // What the server told at joining.
-struct Joined {
+struct JoinedSession {
   std::string session_id;
   std::string binding_id;
   std::string encoding;
@@ -73,7 +73,7 @@ class DeformStream {
   // Cancels what is still under way.
   ~DeformStream();
 
-  const Joined& joined() const;
+  const JoinedSession& joined() const;
 
   // Sends a pose, whole or in part, and returns its sequence number, counted
   // from 1. Blocks while the connection is full. An error means that the stream

@@ -21,7 +21,7 @@ class DeformStream::Impl {
   // The first call. Waits for the server's answer.
   absl::Status Join(const v1::Join& join);
 
-  const Joined& joined() const { return joined_; }
+  const JoinedSession& joined() const { return joined_; }
   absl::StatusOr<uint64_t> Send(const PoseUpdate& update);
   absl::Status NextFrame(Frame& frame);
   uint64_t rejected_sequence() const { return rejected_sequence_; }
@@ -36,7 +36,7 @@ class DeformStream::Impl {
   const std::unique_ptr<
       grpc::ClientReaderWriter<v1::DeformRequest, v1::DeformResponse>>
       call_;
-  Joined joined_;
+  JoinedSession joined_;
 
   // The sending thread's.
   uint64_t sequence_ = 0;

@@ -156,9 +156,10 @@ Camera Camera::Flat(const std::vector<PositionsRef>& points, int width,
 
 Projected Camera::Project(const Vec3& point) const {
   const Vec3 p = axes_ * (point - target_);
-  const double depth = flat_ ? 1 : distance_ - p.z();
-  const double scale = flat_ ? scale_ : scale_ / depth;
-  return {center_x_ + scale * p.x(), center_y_ - scale * p.y(), depth};
+  const double away = flat_ ? 1 : distance_ - p.z();
+  const double scale = scale_ / away;
+  return {center_x_ + scale * p.x(), center_y_ - scale * p.y(),
+          flat_ ? 1 : away / distance_};
 }
 
 Vec3 Camera::ToEye(const Vec3& point) const {

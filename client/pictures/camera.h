@@ -25,7 +25,8 @@ struct View {
 absl::StatusOr<View> ParseView(absl::string_view text, View::Up up);
 
 // A point of the picture: x to the right and y downwards in pixels; `depth`
-// grows away from the eye, in model units; it is above 0, and 1 in a flat view.
+// grows away from the eye and is 1 at the distance of the model's middle, in a
+// flat view everywhere.
 struct Projected {
   double x = 0;
   double y = 0;

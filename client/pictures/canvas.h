@@ -42,7 +42,7 @@ class Canvas {
   void ShadeGrooves(double radius, float strength);
 
   // A line with round ends. Where the surface is nearer than the line by more
-  // than `slack` (model units) it is drawn with `hidden_alpha` instead of
+  // than `slack` (of depth) it is drawn with `hidden_alpha` instead of
   // `alpha`. Lines of one layer do not add up where they cross: FlushLines()
   // lays the layer over the picture.
   void Line(const Projected& from, const Projected& to, double width,

@@ -35,7 +35,7 @@ Positions CornerNormals(const PositionsRef& positions, const Faces& faces,
     const Vec3 b = positions.row(faces(f, 1));
     const Vec3 c = positions.row(faces(f, 2));
     const Vec3 normal = (b - a).cross(c - a);
-    const double length = normal.norm();
+    const double length = normal.stableNorm();
     area.row(f) = normal;
     unit.row(f) = length > 0 ? Vec3(normal / length) : Vec3::Zero();
   }
@@ -50,7 +50,7 @@ Positions CornerNormals(const PositionsRef& positions, const Faces& faces,
       const int64_t face = around.corner[k] / 3;
       if (own.dot(unit.row(face)) >= threshold) sum += area.row(face);
     }
-    const double length = sum.norm();
+    const double length = sum.stableNorm();
     normals.row(i) = length > 0 ? Vec3(sum / length) : own;
   }
   return normals;

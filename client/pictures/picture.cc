@@ -1,5 +1,6 @@
 #include "client/pictures/picture.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -82,11 +83,9 @@ class Lamp {
         fill_(Vec3(0.8, 0.05, 0.5).normalized()) {}
 
   Light Shade(const Light& color, const Light& inside, const Vec3& world_normal,
-              const Vec3& world_to_eye) const {
-    Vec3 n = axes_ * world_normal;
+              const Vec3& world_to_eye, bool back) const {
+    const Vec3 n = axes_ * (back ? Vec3(-world_normal) : world_normal);
     const Vec3 eye = axes_ * world_to_eye;
-    const bool back = n.dot(eye) < 0;
-    if (back) n = -n;
     const double key = std::max(0.0, n.dot(key_));
     const double fill = std::max(0.0, n.dot(fill_));
     const double sky = 0.5 + 0.5 * n.y();
@@ -123,10 +122,15 @@ void DrawShaded(const Positions& positions, const Faces& faces,
     const Projected corners[3] = {
         projected[faces(f, 0)], projected[faces(f, 1)], projected[faces(f, 2)]};
     const Eigen::Matrix3d n = normals.middleRows<3>(3 * f).transpose();
-    const Vec3 to_eye = camera.ToEye(positions.row(faces(f, 0)));
+    const Vec3 a = positions.row(faces(f, 0));
+    const Vec3 to_eye = camera.ToEye(a);
+    // Of the face itself: near its outline a smooth normal may turn away.
+    const Vec3 b = positions.row(faces(f, 1));
+    const Vec3 c = positions.row(faces(f, 2));
+    const bool back = (b - a).cross(c - a).dot(to_eye) < 0;
     canvas.Triangle(corners, [&](const Eigen::Vector3f& place) {
       const Vec3 normal = (n * place.cast<double>()).normalized();
-      return lamp.Shade(kModel, kModelInside, normal, to_eye);
+      return lamp.Shade(kModel, kModelInside, normal, to_eye, back);
     });
   }
   canvas.ShadeGrooves(0.018 * canvas.width(), 0.5f);
@@ -182,14 +186,14 @@ void DrawPoints(const Positions& positions, const Camera& camera, double width,
 
 void DrawRig(const Positions& rig, const Faces& faces, const Camera& camera,
              double pixel, Canvas& canvas) {
-  const double slack = 2e-3 * BoxOf(rig).diagonal();
+  constexpr double kSlack = 1e-3;
   const std::vector<Projected> projected = ProjectAll(camera, rig);
   for (const auto& [a, b] : EdgesOf(faces)) {
-    canvas.Line(projected[a], projected[b], 1.5 * pixel, 0.75f, 0.14f, slack);
+    canvas.Line(projected[a], projected[b], 1.5 * pixel, 0.75f, 0.14f, kSlack);
   }
   const double dot = (faces.rows() > 0 ? 4.5 : 8) * pixel;
   for (const Projected& at : projected) {
-    canvas.Line(at, at, dot, 0.95f, 0.22f, slack);
+    canvas.Line(at, at, dot, 0.95f, 0.22f, kSlack);
   }
   canvas.FlushLines(kRig);
 }

@@ -61,60 +61,6 @@ std::vector<int32_t> Ordered(const PositionsRef& points) {
   return order;
 }
 
-using Columns = Eigen::Matrix<double, Eigen::Dynamic, 3>;
-
-// Solves runs of an order of points, as many points at a time as there are
-// lanes, each from where the one before it ended.
-class LaneGroup {
- public:
-  // `s` are the user weights of T-CC, or null. Borrows both.
-  LaneGroup(const Columns& handles, const double* s)
-      : lanes_(CelestialLanes()),
-        scratch_(8 * lanes_ * handles.rows()),
-        weights_(lanes_ * handles.rows()),
-        solution_(3 * lanes_),
-        places_(3 * lanes_),
-        job_{.handles = handles.rows(),
-             .x = handles.col(0).data(),
-             .y = handles.col(1).data(),
-             .z = handles.col(2).data(),
-             .s = s,
-             .points = places_.get(),
-             .scratch = scratch_.get(),
-             .weights = weights_.get(),
-             .solution = solution_.get()} {}
-
-  int lanes() const { return lanes_; }
-  int steps() const { return job_.steps; }
-  bool solved(int lane) const { return job_.solved >> lane & 1; }
-
-  // The points `run`, at least one; the last fills what is left of the lanes.
-  void Solve(const PositionsRef& points, std::span<const int32_t> run) {
-    for (int lane = 0; lane < lanes_; ++lane) {
-      const int64_t i = run[std::min<size_t>(lane, run.size() - 1)];
-      for (int d = 0; d < 3; ++d) {
-        places_[d * lanes_ + lane] = points(i, d);
-        solution_[d * lanes_ + lane] = start_[d];
-      }
-    }
-    SolveCelestialLanes(job_);
-    for (int d = 0; d < 3; ++d) {
-      start_[d] = solved(lanes_ - 1) ? solution_[(d + 1) * lanes_ - 1] : 0;
-    }
-  }
-
-  void CopyWeights(int lane, std::span<double> row) const {
-    for (size_t k = 0; k < row.size(); ++k)
-      row[k] = weights_[k * lanes_ + lane];
-  }
-
- private:
-  int lanes_;
-  AlignedDoubles scratch_, weights_, solution_, places_;
-  CelestialLaneJob job_;
-  Vec3 start_ = Vec3::Zero();
-};
-
 class CelestialEvaluator final : public WeightEvaluator {
  public:
   CelestialEvaluator(CelestialKind kind, const Handles& handles,
@@ -151,36 +97,62 @@ class CelestialEvaluator final : public WeightEvaluator {
  private:
   void EvaluateLanes(const PositionsRef& points, std::span<const int32_t> order,
                      WeightBlock& block) const {
-    LaneGroup group(columns_,
-                    kind_ == CelestialKind::kScaling ? nullptr : s_.data());
+    const int64_t handles = handles_.rows();
+    const int lanes = CelestialLanes();
+    const AlignedDoubles scratch(8 * lanes * handles);
+    const AlignedDoubles weights(lanes * handles);
+    const AlignedDoubles solution(3 * lanes);
+    const AlignedDoubles places(3 * lanes);
+    CelestialLaneJob job = {
+        .handles = handles,
+        .x = columns_.col(0).data(),
+        .y = columns_.col(1).data(),
+        .z = columns_.col(2).data(),
+        .s = kind_ == CelestialKind::kScaling ? nullptr : s_.data(),
+        .points = places.get(),
+        .scratch = scratch.get(),
+        .weights = weights.get(),
+        .solution = solution.get()};
     Directions directions;
-    directions.Resize(handles_.rows());
-    WideVec3 start = WideVec3::Zero();  // For those that lanes do not solve.
-    while (!order.empty()) {
-      const auto run =
-          order.first(std::min<size_t>(group.lanes(), order.size()));
-      order = order.subspan(run.size());
-      group.Solve(points, run);
-      for (int lane = 0; lane < std::ssize(run); ++lane) {
-        const int32_t i = run[lane];
-        if (group.solved(lane)) {
-          group.CopyWeights(lane, RowOf(block, i));
-          block.iterations[i] = static_cast<uint16_t>(group.steps());
-        } else {
-          start = EvaluatePoint(i, points.row(i), start, directions, block);
+    directions.Resize(handles);
+    Vec3 start = Vec3::Zero();
+    WideVec3 hard = WideVec3::Zero();  // Where the last plain search ended.
+    const auto n = std::ssize(order);
+    for (int64_t first = 0; first < n; first += lanes) {
+      for (int lane = 0; lane < lanes; ++lane) {
+        // The last point fills what is left of its group.
+        const int32_t i = order[std::min(first + lane, n - 1)];
+        for (int d = 0; d < 3; ++d) {
+          places[d * lanes + lane] = points(i, d);
+          solution[d * lanes + lane] = start[d];
         }
       }
+      SolveCelestialLanes(job);
+      for (int lane = 0; lane < std::min<int64_t>(lanes, n - first); ++lane) {
+        const int32_t i = order[first + lane];
+        if (job.solved >> lane & 1) {
+          double* row = block.vertex.row(i).data();
+          for (int64_t k = 0; k < handles; ++k) {
+            row[k] = weights[k * lanes + lane];
+          }
+          block.iterations[i] = static_cast<uint16_t>(job.steps);
+          continue;
+        }
+        hard = EvaluatePoint(i, points.row(i), hard, directions, block);
+      }
+      // All start where the point just before them ended.
+      const bool solved = job.solved >> (lanes - 1) & 1;
+      for (int d = 0; d < 3; ++d) {
+        start[d] = solved ? solution[d * lanes + lanes - 1] : 0;
+      }
     }
-  }
-
-  std::span<double> RowOf(WeightBlock& block, int64_t i) const {
-    return {block.vertex.row(i).data(), static_cast<size_t>(handles_.rows())};
   }
 
   // Returns where the search ended: a start for the next.
   WideVec3 EvaluatePoint(int64_t i, const Vec3& point, const WideVec3& start,
                          Directions& directions, WeightBlock& block) const {
-    const std::span<double> row = RowOf(block, i);
+    const std::span<double> row(block.vertex.row(i).data(),
+                                static_cast<size_t>(handles_.rows()));
     if (!LookFrom(point, directions)) {
       SitOnHandle(point, row);
       return WideVec3::Zero();
@@ -222,7 +194,7 @@ class CelestialEvaluator final : public WeightEvaluator {
   CelestialKind kind_;
   CelestialWay way_;
   Positions handles_;
-  Columns columns_;  // The same by columns.
+  Eigen::Matrix<double, Eigen::Dynamic, 3> columns_;  // The same by columns.
   std::vector<double> s_;
   double largest_coordinate_;
 };

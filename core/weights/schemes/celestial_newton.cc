@@ -25,6 +25,11 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 template <class Real>
 using Vector = Eigen::Matrix<Real, 3, 1>;
 
+template <class Real>
+double ExponentIn(const Directions& q, int64_t i, const Vector<Real>& y) {
+  return static_cast<double>(q.x[i] * y.x() + q.y[i] * y.y() + q.z[i] * y.z());
+}
+
 // Phi and its derivatives at a point y, and what else one pass can tell.
 struct Moments {
   double value = 0;
@@ -42,7 +47,7 @@ Moments MomentsAt(const Directions& q, const Potential& potential,
                   const Vector<Real>& y) {
   Moments m;
   for (int64_t i = 0; i < q.size(); ++i) {
-    const double u = Exponent(q, i, y);
+    const double u = ExponentIn(q, i, y);
     const PotentialTerms terms = potential.At(i, u);
     m.value += terms.value;
     m.magnitude += std::abs(terms.value);
@@ -115,10 +120,10 @@ template <class Real>
 Reach ReachOf(const Directions& q, const Vector<Real>& y, const Vec3& step) {
   Reach reach;
   for (int64_t i = 0; i < q.size(); ++i) {
-    const double du = Exponent(q, i, step);
+    const double du = ExponentIn(q, i, step);
     if (!(du < 0)) reach.separates = false;
     if (du > 0) {
-      const double room = kMaxExponent - Exponent(q, i, y);
+      const double room = kMaxExponent - ExponentIn(q, i, y);
       reach.length = std::min(reach.length, room / du);
     }
   }

@@ -39,9 +39,7 @@ struct NewtonSolution {
 };
 
 // q_i . y
-template <class Real>
-double Exponent(const Directions& q, int64_t i,
-                const Eigen::Matrix<Real, 3, 1>& y) {
+inline double Exponent(const Directions& q, int64_t i, const WideVec3& y) {
   return static_cast<double>(q.x[i] * y.x() + q.y[i] * y.y() + q.z[i] * y.z());
 }
 

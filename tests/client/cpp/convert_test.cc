@@ -128,7 +128,7 @@ TEST(RigOfABinding, IsRefusedIfItsNumbersDoNotFit) {
   EXPECT_FALSE(FromProto(rig).ok());
 }
 
-TEST(JoinedSession, NeedsAPoseOfItsVertexCount) {
+TEST(JoinedMessage, NeedsAPoseOfItsVertexCount) {
   v1::Joined joined;
   joined.set_dimension(3);
   joined.set_vertex_count(2);

@@ -1,0 +1,213 @@
+// deformctl play: a sequence of poses through the stream.
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "client/cli/command.h"
+#include "client/cli/exit_code.h"
+#include "client/cli/files.h"
+#include "client/cli/motion.h"
+#include "client/cli/player.h"
+#include "client/cli/progress.h"
+#include "client/cli/stage.h"
+#include "core/base/error.h"
+#include "core/base/status_macros.h"
+
+namespace deform::cli {
+namespace {
+
+struct Options {
+  StageOptions stage;
+  std::vector<std::string> poses;
+  std::string motion;
+  int64_t frames = 120;
+  std::string delivery = "every";
+  int in_flight = 4;
+  double rate = 0;
+  double blend = 1;
+  std::string out_dir;
+};
+
+// Poses by number, from 0.
+class Script {
+ public:
+  static absl::StatusOr<Script> Create(const Options& options,
+                                       const Stage& stage) {
+    Script script;
+    for (const std::string& path : options.poses) {
+      DEFORM_ASSIGN_OR_RETURN(Positions pose, stage.LoadPose(path));
+      script.poses_.push_back(std::move(pose));
+    }
+    for (int64_t i = 0; options.poses.empty() && i < options.frames; ++i) {
+      const double time =
+          static_cast<double>(i + 1) / static_cast<double>(options.frames);
+      DEFORM_ASSIGN_OR_RETURN(Positions pose,
+                              PoseOfMotion(options.motion, stage.rig().vertices,
+                                           stage.rig().dimension, time));
+      script.poses_.push_back(std::move(pose));
+    }
+    return script;
+  }
+
+  int64_t size() const { return static_cast<int64_t>(poses_.size()); }
+  const Positions& at(int64_t i) const { return poses_[i]; }
+
+ private:
+  std::vector<Positions> poses_;
+};
+
+absl::Status PrepareDirectory(const std::string& path) {
+  if (path.empty()) return absl::OkStatus();
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (!error) return absl::OkStatus();
+  return WithExit(kBadFile,
+                  InvalidInput("FILE_NOT_WRITABLE", "",
+                               absl::StrCat(path, ": ", error.message())));
+}
+
+// "frame_0012.obj" answers the 12th pose.
+absl::Status WriteFrame(const Options& options, const Stage& stage,
+                        const Frame& frame) {
+  if (options.out_dir.empty()) return absl::OkStatus();
+  const std::string extension = stage.model() ? stage.model()->format : "obj";
+  const std::filesystem::path path =
+      std::filesystem::path(options.out_dir) /
+      absl::StrFormat("frame_%04d.%s", frame.answers_sequence, extension);
+  DEFORM_ASSIGN_OR_RETURN(const std::string bytes,
+                          stage.FileWith(frame.DoublePositions()));
+  return WriteFile(path.string(), bytes);
+}
+
+void Tell(const Options& options, const Stage& stage, const PlayReport& report,
+          Console& console) {
+  const double seconds = std::max(report.seconds, 1e-9);
+  const auto frames = static_cast<double>(std::max<int64_t>(report.frames, 1));
+  const double rate = static_cast<double>(report.frames) / seconds;
+  const double deform_ms =
+      1e-3 * static_cast<double>(report.deform_us) / frames;
+  const double columns = static_cast<double>(report.columns_applied) / frames;
+  const Json json = {{"point_count", stage.binding().point_count},
+                     {"poses", report.poses_sent},
+                     {"frames", report.frames},
+                     {"skipped_revisions", report.skipped_revisions},
+                     {"seconds", report.seconds},
+                     {"frames_per_second", rate},
+                     {"latency_ms",
+                      {{"p50", report.LatencyMs(0.5)},
+                       {"p99", report.LatencyMs(0.99)},
+                       {"max", report.LatencyMs(1)}}},
+                     {"bytes", report.bytes},
+                     {"deform_ms", deform_ms},
+                     {"columns_applied", columns},
+                     {"exit_mismatch_max", report.exit_mismatch_max},
+                     {"out_dir", options.out_dir}};
+  console.Result(json, [&](std::ostream& out) {
+    out << absl::StrFormat(
+        "%s poses, %s frames of %s points in %s: %.1f frames/s, %s/s\n",
+        Thousands(report.poses_sent), Thousands(report.frames),
+        Thousands(stage.binding().point_count), Seconds(report.seconds), rate,
+        Bytes(
+            static_cast<int64_t>(static_cast<double>(report.bytes) / seconds)));
+    out << absl::StrFormat(
+        "pose to frame: p50 %.2f ms, p99 %.2f ms, max %.2f ms\n",
+        report.LatencyMs(0.5), report.LatencyMs(0.99), report.LatencyMs(1));
+    out << absl::StrFormat(
+        "server: %.2f ms deforming a frame, %.0f of %d columns applied\n",
+        deform_ms, columns,
+        stage.binding().vertex_count + stage.binding().normal_count);
+    if (report.skipped_revisions > 0) {
+      out << Thousands(static_cast<int64_t>(report.skipped_revisions))
+          << " revisions skipped\n";
+    }
+    if (!options.out_dir.empty()) out << "wrote " << options.out_dir << "\n";
+  });
+}
+
+absl::Status Run(const Options& options, Context& context) {
+  if (options.poses.empty() == options.motion.empty()) {
+    return UsageError("give pose files, or a built-in --motion");
+  }
+  context.interruption.expected = true;
+  DEFORM_RETURN_IF_ERROR(PrepareDirectory(options.out_dir));
+  DEFORM_ASSIGN_OR_RETURN(const std::unique_ptr<Stage> stage,
+                          Stage::Open(context, options.stage));
+  DEFORM_ASSIGN_OR_RETURN(const Script script, Script::Create(options, *stage));
+  DEFORM_ASSIGN_OR_RETURN(
+      DeformStream stream,
+      stage->client().Deform(
+          stage->session().session_id,
+          options.delivery == "every" ? Delivery::kEvery : Delivery::kLatest));
+  Progress progress(context.console, "playing");
+  const PlayOptions play{.poses = script.size(),
+                         .in_flight = options.in_flight,
+                         .rate = options.rate,
+                         .interrupted = &context.interruption.requested};
+  DEFORM_ASSIGN_OR_RETURN(
+      const PlayReport report,
+      Play(
+          stream, play,
+          [&](int64_t i) -> absl::StatusOr<PoseUpdate> {
+            return PoseUpdate{.positions = script.at(i),
+                              .stretch_blend = options.blend};
+          },
+          [&](const Frame& frame) {
+            progress.Show(static_cast<int64_t>(frame.answers_sequence),
+                          script.size());
+            return WriteFrame(options, *stage, frame);
+          }));
+  Tell(options, *stage, report, context.console);
+  return stage->Close();
+}
+
+Action Setup(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  app.add_option("poses", options->poses, "Posed cages or handles, in order")
+      ->type_name("FILE");
+  app.add_option("--motion", options->motion,
+                 "Instead of files: twist, bend, stretch or pulse the rig")
+      ->check(CLI::IsMember({"twist", "bend", "stretch", "pulse"}));
+  app.add_option("--frames", options->frames, "Poses of the motion")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  app.add_option("--delivery", options->delivery,
+                 "every: a frame for each pose; latest: the newest state, "
+                 "poses may merge")
+      ->check(CLI::IsMember({"every", "latest"}))
+      ->capture_default_str();
+  app.add_option("--in-flight", options->in_flight,
+                 "Poses sent ahead of the frames that answer them, at most")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  app.add_option("--rate", options->rate,
+                 "Poses per second; 0: as fast as frames come")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  app.add_option("--blend", options->blend,
+                 "Stretch blend: 1 distorts least, 0 stretches freely")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  app.add_option("--out-dir", options->out_dir,
+                 "Write each frame as a file; without it only figures are told")
+      ->type_name("DIR");
+  options->stage.AddTo(app);
+  return [options](Context& context) { return Run(*options, context); };
+}
+
+}  // namespace
+
+const Command& PlayCommand() {
+  static const Command command = {
+      "play", "Play poses through the stream and measure it",
+      "deformctl play pose_*.obj --model-file a.obj --cage c.obj "
+      "--out-dir frames\n"
+      "deformctl play --motion twist --model-file a.obj --cage c.obj\n"
+      "deformctl play --motion bend --binding $binding --rate 60 "
+      "--delivery latest",
+      "", Setup};
+  return command;
+}
+
+}  // namespace deform::cli

@@ -1,0 +1,172 @@
+#include "client/cli/info_text.h"
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "absl/time/time.h"
+
+namespace deform::cli {
+namespace {
+
+// "name          value" lines.
+class Properties {
+ public:
+  explicit Properties(std::ostream& out) : out_(out) {}
+  void Add(absl::string_view name, absl::string_view value) {
+    out_ << absl::StrFormat("%-14s %s\n", name, value);
+  }
+
+ private:
+  std::ostream& out_;
+};
+
+std::string Corner(const std::vector<double>& corner) {
+  return absl::StrCat("(", absl::StrJoin(corner, ", "), ")");
+}
+
+// "3, 17, 18 and 4 more".
+std::string FirstOf(const std::vector<int64_t>& numbers, size_t count) {
+  const size_t shown = std::min(count, numbers.size());
+  std::string text =
+      absl::StrJoin(numbers.begin(), numbers.begin() + shown, ", ");
+  if (shown < numbers.size()) {
+    absl::StrAppend(&text, " and ", Thousands(numbers.size() - shown), " more");
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string TimeText(WallTime time) {
+  return absl::FormatTime("%Y-%m-%dT%H:%M:%SZ", absl::FromChrono(time),
+                          absl::UTCTimeZone());
+}
+
+Json ToJson(const ModelInfo& model) {
+  return {{"model_id", model.model_id},
+          {"display_name", model.display_name},
+          {"dimension", model.dimension},
+          {"vertex_count", model.vertex_count},
+          {"face_count", model.face_count},
+          {"box_min", model.box_min},
+          {"box_max", model.box_max},
+          {"create_time", TimeText(model.create_time)}};
+}
+
+Json ToJson(const BindingInfo& binding) {
+  Json unbound = Json::array();
+  for (const UnboundInfo& group : binding.unbound) {
+    unbound.push_back({{"reason", group.reason}, {"points", group.points}});
+  }
+  Json parts = Json::array();
+  for (const ExitPartInfo& part : binding.exit_parts) {
+    parts.push_back({{"exit_face", part.exit_face},
+                     {"point_count", part.point_count},
+                     {"first_point", part.first_point},
+                     {"crossed_faces", part.crossed_faces}});
+  }
+  return {{"binding_id", binding.binding_id},
+          {"model_id", binding.model_id},
+          {"scheme", binding.scheme},
+          {"dimension", binding.dimension},
+          {"point_count", binding.point_count},
+          {"vertex_count", binding.vertex_count},
+          {"normal_count", binding.normal_count},
+          {"rig_diagonal", binding.rig_diagonal},
+          {"weight_bytes", binding.weight_bytes},
+          {"compute_seconds", binding.compute_seconds},
+          {"reproduction_error", binding.reproduction_error},
+          {"weight_sum_max", binding.weight_sum_max},
+          {"unbound_count", binding.unbound_count},
+          {"unbound", unbound},
+          {"exit_parts", parts},
+          {"warnings", binding.warnings},
+          {"create_time", TimeText(binding.create_time)}};
+}
+
+Json ToJson(const SessionInfo& session) {
+  return {{"session_id", session.session_id},
+          {"binding_id", session.binding_id},
+          {"revision", session.revision},
+          {"epoch", session.epoch},
+          {"participant_count", session.participant_count},
+          {"create_time", TimeText(session.create_time)}};
+}
+
+Json ToJson(const SchemeInfo& scheme) {
+  return {{"scheme", scheme.scheme},
+          {"description", scheme.description},
+          {"takes_cage", scheme.takes_cage},
+          {"uses_normals", scheme.uses_normals}};
+}
+
+void Describe(const ModelInfo& model, std::ostream& out) {
+  Properties properties(out);
+  properties.Add("model", model.model_id);
+  properties.Add("name", model.display_name);
+  properties.Add(
+      "points",
+      absl::StrFormat("%s in %dD, %s triangles", Thousands(model.vertex_count),
+                      model.dimension, Thousands(model.face_count)));
+  properties.Add("box", absl::StrCat(Corner(model.box_min), " to ",
+                                     Corner(model.box_max)));
+  properties.Add("created", TimeText(model.create_time));
+}
+
+void Describe(const BindingInfo& binding, std::ostream& out) {
+  Properties properties(out);
+  properties.Add("binding", binding.binding_id);
+  properties.Add("model", binding.model_id);
+  properties.Add("scheme", binding.scheme);
+  properties.Add("points",
+                 absl::StrFormat("%s in %dD", Thousands(binding.point_count),
+                                 binding.dimension));
+  properties.Add(
+      "rig",
+      absl::StrFormat("%s vertices, %s normals, diagonal %.6g",
+                      Thousands(binding.vertex_count),
+                      Thousands(binding.normal_count), binding.rig_diagonal));
+  properties.Add("weights", absl::StrFormat("%s, computed in %s",
+                                            Bytes(binding.weight_bytes),
+                                            Seconds(binding.compute_seconds)));
+  properties.Add(
+      "quality",
+      absl::StrFormat("reproduces the model to %.2g of the "
+                      "diagonal; largest sum of |weight| %.3g",
+                      binding.reproduction_error, binding.weight_sum_max));
+  for (const ExitPartInfo& part : binding.exit_parts) {
+    std::string crossed;
+    if (!part.crossed_faces.empty()) {
+      crossed =
+          absl::StrCat("; also crosses face ", FirstOf(part.crossed_faces, 6));
+    }
+    properties.Add("outside part",
+                   absl::StrFormat("%s points from %d on, through face %d%s",
+                                   Thousands(part.point_count),
+                                   part.first_point, part.exit_face, crossed));
+  }
+  for (const UnboundInfo& group : binding.unbound) {
+    properties.Add(
+        "not bound",
+        absl::StrFormat("%s points (%s): %s", Thousands(group.points.size()),
+                        group.reason, FirstOf(group.points, 10)));
+  }
+  for (const std::string& warning : binding.warnings) {
+    properties.Add("warning", warning);
+  }
+  properties.Add("created", TimeText(binding.create_time));
+}
+
+void Describe(const SessionInfo& session, std::ostream& out) {
+  Properties properties(out);
+  properties.Add("session", session.session_id);
+  properties.Add("binding", session.binding_id);
+  properties.Add("revision", absl::StrCat(session.revision));
+  properties.Add("epoch", absl::StrCat(session.epoch));
+  properties.Add("participants", absl::StrCat(session.participant_count));
+  properties.Add("created", TimeText(session.create_time));
+}
+
+}  // namespace deform::cli

@@ -1,0 +1,29 @@
+// Options of commands that draw.
+#pragma once
+
+#include <string>
+
+#include "absl/status/status.h"
+#include "client/pictures/picture.h"
+
+namespace CLI {
+class App;
+}
+
+namespace deform::cli {
+
+struct PictureOptions {
+  std::string view = "auto";
+  std::string up = "y";
+  int width = 900;
+  int height = 900;
+  bool no_rig = false;
+
+  void AddTo(CLI::App& app);
+};
+
+// Draws `picture`, as the options say, into a PNG file.
+absl::Status DrawInto(const std::string& path, const PictureOptions& options,
+                      Picture picture);
+
+}  // namespace deform::cli

@@ -1,0 +1,68 @@
+// A session to pose a model in, and what it stands on.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "client/cli/command.h"
+#include "client/cli/rig_options.h"
+#include "core/files/mesh_file.h"
+
+namespace deform::cli {
+
+struct StageOptions {
+  std::string model_file;
+  std::string binding;  // Or a rig.
+  RigOptions rig;
+  bool keep = false;
+
+  void AddTo(CLI::App& app);
+};
+
+// Registers, binds and opens a session, or opens a session of a binding that is
+// there. Not thread-safe.
+class Stage {
+ public:
+  // Errors of files, arguments and the server.
+  static absl::StatusOr<std::unique_ptr<Stage>> Open(
+      Context& context, const StageOptions& options);
+  // Deletes what Open() made, if Close() was not called.
+  ~Stage();
+
+  Client& client() { return client_; }
+  const BindingInfo& binding() const { return binding_; }
+  const SessionInfo& session() const { return session_; }
+  const RigArrays& rig() const { return rig_; }
+  // The model's file, if one was given.
+  const std::optional<MeshFile>& model() const { return model_; }
+
+  // The posed rig that a file holds.
+  absl::StatusOr<Positions> LoadPose(const std::string& path) const;
+
+  // The bytes of the deformed model: its file with the positions replaced, or,
+  // without a file, an OBJ of bare points.
+  absl::StatusOr<std::string> FileWith(const Positions& positions) const;
+
+  // Deletes what Open() made: always the session, and unless it is to be kept
+  // the binding and the model.
+  absl::Status Close();
+
+ private:
+  explicit Stage(Client client) : client_(std::move(client)) {}
+  absl::Status Bind(Context& context, const StageOptions& options);
+  absl::Status UseBinding(const StageOptions& options);
+
+  Client client_;
+  std::optional<MeshFile> model_;
+  RigArrays rig_;
+  BindingInfo binding_;
+  SessionInfo session_;
+  // What is to be deleted; empty if it is not ours.
+  std::string our_model_;
+  std::string our_binding_;
+  std::string our_session_;
+};
+
+}  // namespace deform::cli

@@ -1,0 +1,393 @@
+// deformctl against a live server.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "client/cli/exit_code.h"
+#include "core/files/mesh_file.h"
+#include "tests/client/cli/cli_run.h"
+#include "tests/client/verify/hand_made.h"
+#include "tests/end_to_end/running_server.h"
+
+namespace deform::cli {
+namespace {
+
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+using testing::StartsWith;
+
+class Cli : public testing::Test {
+ protected:
+  Cli()
+      : folder_(testing::TempDir() + "/" +
+                testing::UnitTest::GetInstance()->current_test_info()->name()) {
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+    Write("ball.obj", ObjText(Ball().positions(), Ball().faces()));
+    Write("cube.obj", ObjText(Cube().vertices(), Cube().faces()));
+    Positions posed = Cube().vertices();
+    posed.col(0) = posed.col(0).array() * 1 + 5;
+    Write("moved.obj", ObjText(posed, Cube().faces()));
+  }
+
+  std::string Path(const std::string& name) { return folder_ + "/" + name; }
+  std::string Write(const std::string& name, const std::string& text) {
+    std::ofstream(Path(name), std::ios::binary) << text;
+    return Path(name);
+  }
+  std::string Read(const std::string& name) {
+    std::ifstream stream(Path(name), std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+
+  CliResult Run(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"--server", server_.address()});
+    return RunCli(arguments);
+  }
+  Json RunJson(std::vector<std::string> arguments) {
+    arguments.push_back("--json");
+    const CliResult result = Run(arguments);
+    EXPECT_EQ(result.exit_code, kOk) << result.out << result.err;
+    return result.json();
+  }
+
+  std::string Register() {
+    return RunJson({"register", Path("ball.obj")})["model_id"];
+  }
+  std::string Bind() {
+    return RunJson(
+        {"bind", Register(), "--cage", Path("cube.obj")})["binding_id"];
+  }
+  bool ServerIsEmpty() {
+    return server_.client().ListModels()->empty() &&
+           server_.client().ListBindings()->empty() &&
+           server_.client().ListSessions()->empty();
+  }
+
+  RunningServer server_;
+  const std::string folder_;
+};
+
+TEST_F(Cli, RegisterPrintsTheIdAlone) {
+  const CliResult result = Run({"register", Path("ball.obj")});
+  EXPECT_EQ(result.exit_code, kOk);
+  const std::string id = server_.client().ListModels()->front().model_id;
+  EXPECT_EQ(result.out, id + "\n");
+  EXPECT_EQ(result.err, "162 vertices, 320 triangles\n");
+  EXPECT_THAT(Run({"register", Path("ball.obj")}).err,
+              HasSubstr("was there before"));
+}
+
+TEST_F(Cli, BindTellsHowItWent) {
+  const CliResult result =
+      Run({"bind", Register(), "--cage", Path("cube.obj")});
+  EXPECT_EQ(result.exit_code, kOk) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("scheme         green\n"));
+  EXPECT_THAT(result.out, HasSubstr("points         162 in 3D\n"));
+  EXPECT_THAT(result.out, HasSubstr("rig            8 vertices, 12 normals"));
+}
+
+TEST_F(Cli, BindSaysWhatToDoAboutPointsOutside) {
+  Write("small.obj", ObjText(Cube().vertices() * 0.3, Cube().faces()));
+  const std::string model = Register();
+  const CliResult refused = Run({"bind", model, "--cage", Path("small.obj")});
+  EXPECT_EQ(refused.exit_code, kRefused);
+  EXPECT_THAT(refused.err, HasSubstr("(EXTERIOR_NO_EXIT_FACE)"));
+  EXPECT_THAT(refused.err, HasSubstr("next: use --exit auto"));
+  const Json reported = RunJson(
+      {"bind", model, "--cage", Path("small.obj"), "--unbindable", "report"});
+  EXPECT_EQ(reported["unbound"][0]["reason"], "EXTERIOR_NO_EXIT_FACE");
+  EXPECT_EQ(reported["unbound"][0]["points"].size(),
+            reported["unbound_count"].get<size_t>());
+}
+
+TEST_F(Cli, BindTurnsAnInsideOutCageOnRequest) {
+  Faces faces = Cube().faces();
+  faces.col(0).swap(faces.col(1));
+  Write("inverted.obj", ObjText(Cube().vertices(), faces));
+  const std::string model = Register();
+  const CliResult refused =
+      Run({"bind", model, "--cage", Path("inverted.obj")});
+  EXPECT_EQ(refused.exit_code, kRefused);
+  EXPECT_THAT(refused.err, HasSubstr("--flip-cage"));
+  EXPECT_EQ(Run({"bind", model, "--cage", Path("inverted.obj"), "--flip-cage"})
+                .exit_code,
+            kOk);
+}
+
+TEST_F(Cli, DeformReplacesThePositionsAndNothingElse) {
+  Write("ball.obj", "# a ball\n" + Read("ball.obj") + "# the end\n");
+  const CliResult result = Run(
+      {"deform", "--model-file", Path("ball.obj"), "--cage", Path("cube.obj"),
+       "--pose", Path("moved.obj"), "--out", Path("out.obj"), "--png",
+       Path("out.png"), "--width", "64", "--height", "64"});
+  EXPECT_EQ(result.exit_code, kOk) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("162 points deformed"));
+  EXPECT_THAT(Read("out.obj"), StartsWith("# a ball\nv "));
+  EXPECT_THAT(Read("out.obj"), EndsWith("# the end\n"));
+  EXPECT_THAT(Read("out.png"), StartsWith("\x89PNG"));
+  const MeshFile out = ReadMeshFile(Path("out.obj")).value();
+  Positions expected = Ball().positions();
+  expected.col(0).array() += 5;
+  // The float of the wire, at the size of the ball.
+  EXPECT_LT((out.positions - expected).cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_EQ(out.faces, Ball().faces());
+  EXPECT_TRUE(ServerIsEmpty());
+}
+
+TEST_F(Cli, DeformLeavesAloneWhatWasThereBefore) {
+  const std::string binding = Bind();
+  EXPECT_EQ(Run({"deform", "--model-file", Path("ball.obj"), "--cage",
+                 Path("cube.obj"), "--pose", Path("moved.obj"), "--out",
+                 Path("out.obj")})
+                .exit_code,
+            kOk);
+  EXPECT_TRUE(server_.client().GetBinding(binding).ok());
+  EXPECT_THAT(*server_.client().ListSessions(), IsEmpty());
+}
+
+TEST_F(Cli, DeformWithABindingNeedsNoModelFile) {
+  const CliResult result =
+      Run({"deform", "--binding", Bind(), "--pose", Path("moved.obj"), "--out",
+           Path("points.obj")});
+  EXPECT_EQ(result.exit_code, kOk) << result.err;
+  EXPECT_EQ(ReadMeshFile(Path("points.obj"))->positions.rows(), 162);
+}
+
+TEST_F(Cli, DeformSaysWhenFilesDoNotFit) {
+  const CliResult pose = Run({"deform", "--model-file", Path("ball.obj"),
+                              "--cage", Path("cube.obj"), "--pose",
+                              Path("ball.obj"), "--out", Path("out.obj")});
+  EXPECT_EQ(pose.exit_code, kBadFile);
+  EXPECT_THAT(pose.err, HasSubstr("ball.obj: has 162 vertices, the rig has 8"));
+  EXPECT_TRUE(ServerIsEmpty()) << "also after an error";
+  const CliResult model =
+      Run({"deform", "--model-file", Path("cube.obj"), "--binding", Bind(),
+           "--pose", Path("moved.obj"), "--out", Path("out.obj")});
+  EXPECT_EQ(model.exit_code, kBadFile);
+  EXPECT_THAT(
+      model.err,
+      HasSubstr("cube.obj: has 8 vertices, the binding's model has 162"));
+}
+
+TEST_F(Cli, DeformKeepsTheZOfAFlatModel) {
+  Write("grid.obj", "v 0.2 0.2 7\nv 0.8 0.2 7\nv 0.5 0.8 7\nf 1 2 3\n");
+  Write("square.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nl 1 2 3 4 1\n");
+  Write("pose.obj", "v 3 0 0\nv 4 0 0\nv 4 1 0\nv 3 1 0\nl 1 2 3 4 1\n");
+  const CliResult result = Run({"deform", "--model-file", Path("grid.obj"),
+                                "--cage", Path("square.obj"), "--pose",
+                                Path("pose.obj"), "--out", Path("out.obj")});
+  EXPECT_EQ(result.exit_code, kOk) << result.err;
+  const MeshFile out =
+      ReadMeshFile(Path("out.obj"), FileDimension::k3d).value();
+  EXPECT_NEAR(out.positions(0, 0), 3.2, 1e-6);
+  EXPECT_EQ(out.positions(0, 2), 7);
+}
+
+TEST_F(Cli, PlayAnswersEveryPose) {
+  const Json report = RunJson({"play", "--motion", "twist", "--frames", "20",
+                               "--model-file", Path("ball.obj"), "--cage",
+                               Path("cube.obj"), "--out-dir", Path("frames")});
+  EXPECT_EQ(report["poses"], 20);
+  EXPECT_EQ(report["frames"], 20);
+  EXPECT_EQ(report["skipped_revisions"], 0);
+  EXPECT_GT(report["latency_ms"]["p50"], 0);
+  EXPECT_TRUE(std::filesystem::exists(Path("frames/frame_0001.obj")));
+  // A motion ends at rest.
+  const MeshFile last = ReadMeshFile(Path("frames/frame_0020.obj")).value();
+  EXPECT_LT((last.positions - Ball().positions()).cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_TRUE(ServerIsEmpty());
+}
+
+TEST_F(Cli, PlayTakesPoseFilesAndTheNewestStateOnly) {
+  const CliResult result = Run({"play", Path("cube.obj"), Path("moved.obj"),
+                                "--delivery", "latest", "--binding", Bind()});
+  EXPECT_EQ(result.exit_code, kOk) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("2 poses, "));
+  EXPECT_THAT(result.out, HasSubstr("pose to frame: p50"));
+}
+
+TEST_F(Cli, ListsAreTablesOrJson) {
+  EXPECT_EQ(Run({"list", "models"}).err, "no models\n");
+  EXPECT_THAT(RunJson({"list", "models"})["models"], SizeIs(0));
+  const std::string binding = Bind();
+  const std::string session =
+      server_.client().CreateSession(binding, "mine")->session_id;
+  EXPECT_THAT(Run({"list", "models"}).out, HasSubstr("ball.obj\n"));
+  EXPECT_THAT(Run({"list", "bindings"}).out, HasSubstr(binding));
+  EXPECT_THAT(Run({"list", "sessions"}).out, HasSubstr("mine"));
+  EXPECT_THAT(Run({"list", "schemes"}).out, HasSubstr("green"));
+  EXPECT_EQ(RunJson({"list", "bindings"})["bindings"][0]["point_count"], 162);
+  EXPECT_EQ(RunJson({"list", "sessions"})["sessions"][0]["session_id"], "mine");
+}
+
+TEST_F(Cli, ShowAndDeleteFindThingsByTheirIds) {
+  const std::string binding = Bind();
+  const std::string model = Register();
+  server_.client().CreateSession(binding, "mine").value();
+  EXPECT_EQ(RunJson({"show", model})["kind"], "model");
+  EXPECT_EQ(RunJson({"show", binding})["kind"], "binding");
+  EXPECT_EQ(RunJson({"show", "mine"})["kind"], "session");
+  const CliResult used = Run({"delete", model});
+  EXPECT_EQ(used.exit_code, kRefused);
+  EXPECT_THAT(used.err, HasSubstr("delete its bindings first"));
+  const CliResult deleted = Run({"delete", "mine", binding, model});
+  EXPECT_EQ(deleted.exit_code, kOk) << deleted.err;
+  EXPECT_EQ(deleted.out, "deleted session mine\ndeleted binding " + binding +
+                             "\ndeleted model " + model + "\n");
+  EXPECT_TRUE(ServerIsEmpty());
+  const CliResult unknown = Run({"show", "mine"});
+  EXPECT_EQ(unknown.exit_code, kRefused);
+  EXPECT_THAT(unknown.err, HasSubstr("no model, binding or session 'mine'"));
+}
+
+TEST_F(Cli, WeightsAreDumpedAsTextAndBytes) {
+  const std::string binding = Bind();
+  const CliResult csv =
+      Run({"weights", binding, "--first", "5", "--count", "2"});
+  EXPECT_EQ(csv.exit_code, kOk) << csv.err;
+  EXPECT_THAT(csv.out, StartsWith("point,v0,"));
+  EXPECT_THAT(csv.out, HasSubstr(",n11\n5,"));
+  EXPECT_EQ(std::count(csv.out.begin(), csv.out.end(), '\n'), 3);
+
+  const Json json = RunJson({"weights", binding, "--double", "--count", "1"});
+  double sum = 0;
+  for (const Json& weight : json["points"][0]["vertex"]) {
+    sum += weight.get<double>();
+  }
+  EXPECT_NEAR(sum, 1, 1e-14);
+
+  EXPECT_EQ(
+      Run({"weights", binding, "--format", "binary", "--out", Path("w.f32")})
+          .exit_code,
+      kOk);
+  EXPECT_EQ(Read("w.f32").size(), 162u * 20 * 4);
+  EXPECT_EQ(Run({"weights", binding, "--double", "--format", "binary", "--out",
+                 Path("w.f64")})
+                .exit_code,
+            kOk);
+  EXPECT_EQ(Read("w.f64").size(), 162u * 20 * 8);
+  EXPECT_EQ(Run({"weights", binding, "--out", "/nonexistent/w"}).exit_code,
+            kBadFile);
+}
+
+TEST_F(Cli, TenantsDoNotSeeEachOther) {
+  Register();
+  EXPECT_THAT(RunJson({"--tenant", "other", "list", "models"})["models"],
+              SizeIs(0));
+}
+
+TEST_F(Cli, VerifyPassesAServerThatIsRight) {
+  Write("triangle.json", TriangleCase().dump());
+  Write("index.json", R"([{"file": "triangle.json"}])");
+  const CliResult result = Run({"verify", folder_});
+  EXPECT_EQ(result.exit_code, kOk) << result.out << result.err;
+  EXPECT_THAT(result.out, HasSubstr("scc.hand"));
+  EXPECT_THAT(result.out, HasSubstr("OK: 1 cases, 2 queries, 0 failures"));
+  EXPECT_TRUE(ServerIsEmpty());
+}
+
+TEST_F(Cli, VerifyFailsAWrongWeightAndNamesTheQuery) {
+  nlohmann::json wrong = TriangleCase();
+  wrong["queries"][0]["expected"]["alpha"][1] = "0.333333333";
+  Write("triangle.json", wrong.dump());
+  const CliResult result = Run({"verify", folder_});
+  EXPECT_EQ(result.exit_code, kCheckFailed);
+  EXPECT_THAT(result.out,
+              HasSubstr("FAIL triangle query 0: vertex weight 1 is off by"));
+  EXPECT_THAT(result.out, HasSubstr("FAILED: 1 cases"));
+  EXPECT_TRUE(ServerIsEmpty());
+}
+
+TEST_F(Cli, VerifyFailsAWrongPosition) {
+  nlohmann::json wrong = TriangleCase();
+  wrong["queries"][0]["expected"]["deformed"]["moved"][0] = "2.001";
+  Write("triangle.json", wrong.dump());
+  const CliResult result = Run({"verify", folder_, "--json"});
+  EXPECT_EQ(result.exit_code, kCheckFailed);
+  EXPECT_EQ(result.err, "");
+  const Json report = result.json();
+  EXPECT_EQ(report["ok"], false);
+  EXPECT_EQ(report["groups"][0]["failures"], 1);
+  EXPECT_EQ(report["failures"][0]["query"], 0);
+  EXPECT_THAT(report["failures"][0]["message"].get<std::string>(),
+              HasSubstr("position in moved is off by"));
+}
+
+TEST_F(Cli, VerifyFailsAnErrorThatDidNotCome) {
+  nlohmann::json wrong = TriangleCase();
+  wrong["queries"][1]["point"] = {"0.5", "0.5"};
+  Write("triangle.json", wrong.dump());
+  EXPECT_THAT(Run({"verify", folder_}).out,
+              HasSubstr("query 1: expected error outside_hull, got a result"));
+}
+
+TEST_F(Cli, VerifyFailsWhatItCannotRead) {
+  Write("a.json", TriangleCase().dump());
+  Write("b.json", "{");
+  nlohmann::json unreadable = TriangleCase();
+  unreadable["queries"][0].erase("point");
+  Write("c.json", unreadable.dump());
+  const CliResult result = Run({"verify", folder_});
+  EXPECT_EQ(result.exit_code, kCheckFailed);
+  EXPECT_THAT(result.out, HasSubstr("b.json: is not JSON"));
+  EXPECT_THAT(result.out,
+              HasSubstr("c.json: queries[0]: has no field 'point'"));
+}
+
+TEST_F(Cli, VerifyFailsAnEmptyDirectory) {
+  const CliResult empty = Run({"verify", folder_});
+  EXPECT_EQ(empty.exit_code, kCheckFailed);
+  EXPECT_THAT(empty.err, HasSubstr("holds no case"));
+  Write("triangle.json", TriangleCase().dump());
+  const CliResult group = Run({"verify", folder_, "--group", "gc3d"});
+  EXPECT_EQ(group.exit_code, kCheckFailed);
+  EXPECT_THAT(group.err, HasSubstr("in a group that begins with gc3d"));
+  EXPECT_EQ(Run({"verify", Path("missing")}).exit_code, kCheckFailed);
+}
+
+TEST_F(Cli, VerifySendsWhatIsInvalidAndWantsItRefused) {
+  nlohmann::json invalid = TriangleCase();
+  invalid["control_points"][1][0] = "nan";
+  invalid["deformations"] = nlohmann::json::array();
+  for (auto& query : invalid["queries"]) {
+    query["expected"] = {{"error", "non_finite"}};
+  }
+  Write("invalid.json", invalid.dump());
+  nlohmann::json point = TriangleCase();
+  point["queries"][1]["point"] = {"inf", "0"};
+  Write("point.json", point.dump());
+  const CliResult result = Run({"verify", folder_});
+  EXPECT_EQ(result.exit_code, kOk) << result.out;
+  EXPECT_THAT(result.out, HasSubstr("2 cases, 4 queries, 0 failures"));
+}
+
+TEST_F(Cli, VerifyDeletesNothingOfOthers) {
+  Write("triangle.json", TriangleCase().dump());
+  Positions points(2, 3);
+  points << 1, 1, 0, 7, 7, 0;  // The model of the case.
+  const std::string id =
+      server_.client().RegisterModel({2, points, Faces()}, "mine")->model_id;
+  EXPECT_EQ(Run({"verify", folder_}).exit_code, kOk);
+  EXPECT_TRUE(server_.client().GetModel(id).ok());
+}
+
+TEST_F(Cli, AnInterruptedVerifyLeavesNothingBehind) {
+  Write("triangle.json", TriangleCase().dump());
+  std::ostringstream out;
+  std::ostringstream err;
+  Interruption interruption;
+  interruption.requested = true;
+  EXPECT_EQ(RunDeformctl({"--server", server_.address(), "verify", folder_},
+                         {out, err, false, interruption}),
+            kInterrupted);
+  EXPECT_TRUE(ServerIsEmpty());
+}
+
+}  // namespace
+}  // namespace deform::cli

@@ -19,7 +19,7 @@ namespace {
 using testing::HasSubstr;
 
 // Coarser than the default, to be quick.
-constexpr CageMakingOptions kOptions{.target_faces = 120, .margin = 0.08};
+constexpr CageMakingOptions kOptions{.target_faces = 120, .margin = 0.12};
 
 double Distance(const Shape& surface, const Vec3& point) {
   double nearest = std::numeric_limits<double>::infinity();

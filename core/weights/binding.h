@@ -40,7 +40,8 @@ struct BindControl {
 
 // Figures of how a binding came out.
 struct BindQuality {
-  // Largest |sum phi v + sum psi n - eta| of the double weights, in units of D.
+  // Largest |sum phi v + sum psi n - eta| of the double weights, in units of D;
+  // positions count from the middle of the rig.
   double reproduction_error = 0;
   // Largest sum of |vertex weight| of a point.
   double weight_sum_max = 0;
@@ -100,13 +101,15 @@ class Binding {
 //   NotFound UNKNOWN_SCHEME; InvalidArgument WRONG_RIG, INVALID_OPTION,
 //   DIMENSION_MISMATCH, those of CheckExitRegions, CAGE_OVERLAPPING
 //   FailedPrecondition EXTERIOR_NO_EXIT_FACE, EXIT_AMBIGUOUS, OUTSIDE_HULL,
-//     NOT_CONVERGED with Unbindable::kFail: says how many, names the first ten
+//     NOT_CONVERGED, WEIGHT_TOO_LARGE (for float) with Unbindable::kFail: says
+//     how many, names the first ten
 //   Cancelled
 absl::StatusOr<std::shared_ptr<const Binding>> Bind(const BindRequest& request,
                                                     const BindControl& control);
 
 // The weights of points [first, first + count) again, in double, as Bind()
 // computed them before they were rounded. Rows of unbound points are 0.
+// InvalidArgument RANGE_OUT_OF_BOUNDS if there are no such points.
 absl::StatusOr<WeightBlock> RecomputeWeights(const Binding& binding,
                                              int64_t first, int64_t count);
 

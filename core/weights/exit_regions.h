@@ -37,7 +37,7 @@ struct ExitPart {
 struct UnboundPoints {
   std::string
       reason;  // EXTERIOR_NO_EXIT_FACE, EXIT_AMBIGUOUS, OUTSIDE_HULL, ...
-  std::string detail;           // For people: "crosses faces 3 and 7".
+  std::string detail;           // For people: the cause, or what to do.
   std::vector<int64_t> points;  // Sorted.
 };
 

@@ -40,8 +40,12 @@ class WeightTiles {
   }
 
  private:
+  // Of the block in which the tiles lie aligned.
   struct Free {
-    void operator()(float* data) const { std::free(data); }
+    Free() : block(nullptr) {}
+    explicit Free(void* b) : block(b) {}
+    void operator()(float* /*data*/) const { std::free(block); }
+    void* block;
   };
   int64_t Offset(int64_t t) const { return t * columns_ * kTilePoints; }
 

@@ -75,6 +75,8 @@ class GrpcServerImpl final : public GrpcServer {
   }
 
   absl::Status Start(const Options& options) {
+    // Kept for ever: gRPC's own end may wait 10 s for one of its pollers.
+    [[maybe_unused]] static const bool kept = (grpc_init(), true);
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;

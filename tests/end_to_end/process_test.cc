@@ -1,0 +1,267 @@
+// The program itself: what it prints, how it ends.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/cpp/client.h"
+#include "core/base/error.h"
+#include "deform/v1/binding.grpc.pb.h"
+#include "tests/end_to_end/raw_call.h"
+#include "tests/end_to_end/running_server.h"
+
+namespace deform {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+// Runs deformd; its output can be read. Kills what still runs at the end.
+class Process {
+ public:
+  explicit Process(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), DEFORM_BINARY_DIR "/bin/deformd");
+    int out[2];
+    int err[2];
+    if (pipe2(out, O_CLOEXEC) != 0 || pipe2(err, O_CLOEXEC) != 0) abort();
+    pid_ = fork();
+    if (pid_ == 0) {
+      dup2(out[1], STDOUT_FILENO);
+      dup2(err[1], STDERR_FILENO);
+      std::vector<char*> argv;
+      for (std::string& argument : arguments) argv.push_back(argument.data());
+      argv.push_back(nullptr);
+      execv(argv[0], argv.data());
+      _exit(127);
+    }
+    close(out[1]);
+    close(err[1]);
+    out_ = fdopen(out[0], "r");
+    err_ = fdopen(err[0], "r");
+  }
+  ~Process() {
+    if (pid_ > 0) {
+      kill(pid_, SIGKILL);
+      waitpid(pid_, nullptr, 0);
+    }
+    fclose(out_);
+    fclose(err_);
+  }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  std::string ReadLine() {
+    char line[1000] = "";
+    if (fgets(line, sizeof(line), out_) == nullptr) return "";
+    return line;
+  }
+  std::string ReadAll() { return ReadAll(out_); }
+  std::string ReadErrors() { return ReadAll(err_); }
+  void Signal(int number) { kill(pid_, number); }
+  // 128 + the signal if one ended it.
+  int Wait() {
+    int status = 0;
+    waitpid(pid_, &status, 0);
+    pid_ = -1;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
+
+ private:
+  static std::string ReadAll(FILE* file) {
+    std::string all;
+    for (int c; (c = fgetc(file)) != EOF;) all += static_cast<char>(c);
+    return all;
+  }
+
+  pid_t pid_ = -1;
+  FILE* out_ = nullptr;
+  FILE* err_ = nullptr;
+};
+
+// A deformd that listens.
+class Daemon : public Process {
+ public:
+  explicit Daemon(std::vector<std::string> more = {})
+      : Process(With(std::move(more))) {
+    const std::string line = ReadLine();
+    EXPECT_THAT(line, StartsWith("listening on 127.0.0.1:"));
+    address_ = line.substr(13, line.size() - 14);
+  }
+  const std::string& address() const { return address_; }
+
+ private:
+  static std::vector<std::string> With(std::vector<std::string> more) {
+    more.insert(more.end(), {"--listen", "127.0.0.1:0", "--in-memory",
+                             "--log-level", "warn"});
+    return more;
+  }
+  std::string address_;
+};
+
+TEST(Deformd, SaysWhereItListensAndServesThere) {
+  Daemon daemon;
+  Client client = Client::Connect(daemon.address()).value();
+  const BindingInfo binding = RunningServer::BindBall(client);
+  auto stream =
+      client.Deform(client.CreateSession(binding.binding_id)->session_id)
+          .value();
+  Frame frame;
+  EXPECT_TRUE(stream.NextFrame(frame).ok());
+  EXPECT_EQ(frame.point_count(), 162);
+}
+
+TEST(Deformd, ListensOnAUnixSocket) {
+  const std::string path =
+      "unix:" + testing::TempDir() + "deformd-" + std::to_string(getpid());
+  Process daemon({"--listen", path, "--log-level", "off"});
+  EXPECT_EQ(daemon.ReadLine(), "listening on " + path + "\n");
+  EXPECT_TRUE(Client::Connect(path)->ListModels().ok());
+}
+
+TEST(Deformd, DrainsAndExitsWith0OnSigterm) {
+  Daemon daemon;
+  Client client = Client::Connect(daemon.address()).value();
+  const BindingInfo binding = RunningServer::BindBall(client);
+  auto stream =
+      client.Deform(client.CreateSession(binding.binding_id)->session_id)
+          .value();
+  Frame frame;
+  ASSERT_TRUE(stream.NextFrame(frame).ok());
+  daemon.Signal(SIGTERM);
+  const absl::Status end = stream.NextFrame(frame);
+  EXPECT_EQ(end.code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(DetailOf(end).reason, "SERVER_DRAINING");
+  EXPECT_EQ(daemon.Wait(), 0);
+}
+
+// A call that keeps the server busy for seconds, unless it is stopped.
+class LongBinding {
+ public:
+  explicit LongBinding(const std::string& address)
+      : stub_(v1::BindingService::NewStub(PlainChannel(address))) {
+    Client client = Client::Connect(address).value();
+    v1::CreateBindingRequest request;
+    request.set_model_id(
+        client.RegisterModel(MeshOf(Icosphere(0.5, 6)), "").value().model_id);
+    request.set_scheme("green");
+    auto* cage = request.mutable_rig()->mutable_cage();
+    cage->set_dimension(3);
+    const Shape shape = Icosphere(1, 3);
+    cage->mutable_vertices()->Add(
+        shape.positions.data(),
+        shape.positions.data() + shape.positions.size());
+    cage->mutable_corners()->Add(shape.faces.data(),
+                                 shape.faces.data() + shape.faces.size());
+    reader_ = stub_->CreateBinding(&context_, request);
+    v1::CreateBindingResponse response;
+    EXPECT_TRUE(reader_->Read(&response));
+  }
+  absl::Status Finish() {
+    v1::CreateBindingResponse response;
+    while (reader_->Read(&response)) {
+    }
+    return FromGrpc(reader_->Finish());
+  }
+
+ private:
+  std::unique_ptr<v1::BindingService::Stub> stub_;
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReader<v1::CreateBindingResponse>> reader_;
+};
+
+TEST(Deformd, CancelsWhatOutlastsTheDrainTimeout) {
+  Daemon daemon({"--drain-timeout", "0.2"});
+  LongBinding binding(daemon.address());
+  daemon.Signal(SIGTERM);
+  EXPECT_FALSE(binding.Finish().ok());
+  EXPECT_EQ(daemon.Wait(), 0);
+}
+
+constexpr char kHealth[] = "/grpc.health.v1.Health/Check";
+constexpr char kServing[] = "\x08\x01";
+constexpr char kNotServing[] = "\x08\x02";
+
+TEST(Deformd, TellsItsHealth) {
+  Daemon daemon;
+  EXPECT_EQ(RawCall(daemon.address(), kHealth, "").first, kServing);
+}
+
+TEST(Deformd, IsNotServingWhileItDrainsAndRefusesCalls) {
+  Daemon daemon({"--drain-timeout", "3600"});
+  LongBinding binding(daemon.address());
+  Client client = Client::Connect(daemon.address()).value();
+  daemon.Signal(SIGTERM);
+  while (RawCall(daemon.address(), kHealth, "").first != kNotServing) {
+    std::this_thread::yield();
+  }
+  absl::Status refused;
+  while ((refused = client.ListModels().status()).ok()) {
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(DetailOf(refused).reason, "SERVER_DRAINING");
+  // Asked again it does not wait any longer.
+  daemon.Signal(SIGTERM);
+  EXPECT_EQ(daemon.Wait(), 128 + SIGTERM);
+}
+
+TEST(Deformd, DescribesItsServices) {
+  Daemon daemon;
+  // ServerReflectionRequest{list_services: "*"}
+  const std::string services =
+      RawCall(daemon.address(),
+              "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
+              "\x3a\x01*")
+          .first;
+  for (const char* name :
+       {"deform.v1.ModelService", "deform.v1.BindingService",
+        "deform.v1.SessionService", "grpc.health.v1.Health"}) {
+    EXPECT_THAT(services, HasSubstr(name));
+  }
+}
+
+TEST(Deformd, DoesNotShareAPort) {
+  Daemon first;
+  Process second({"--listen", first.address()});
+  EXPECT_THAT(second.ReadErrors(),
+              HasSubstr("cannot listen on " + first.address()));
+  EXPECT_EQ(second.Wait(), 1);
+}
+
+TEST(Deformd, PrintsItsConfiguration) {
+  Process process({"--max-sessions", "7", "--config-check"});
+  EXPECT_THAT(process.ReadAll(), HasSubstr("\nmax-sessions = 7\n"));
+  EXPECT_EQ(process.Wait(), 0);
+}
+
+TEST(Deformd, RefusesABadConfigurationByFileAndLine) {
+  const std::string file =
+      testing::TempDir() + "deformd-" + std::to_string(getpid()) + ".toml";
+  std::ofstream(file) << "\nmax-sessions = \"many\"\n";
+  Process process({"--config", file});
+  EXPECT_EQ(process.ReadErrors(),
+            "deformd: " + file + ":2: max-sessions: is a whole number\n");
+  EXPECT_EQ(process.Wait(), 2);
+}
+
+TEST(Deformd, HelpsAndTellsItsVersion) {
+  Process help({"--help"});
+  EXPECT_THAT(help.ReadAll(), HasSubstr("State is kept in memory"));
+  EXPECT_EQ(help.Wait(), 0);
+  Process version({"--version"});
+  EXPECT_THAT(version.ReadAll(), StartsWith("deformd "));
+  EXPECT_EQ(version.Wait(), 0);
+  Process unknown({"--frobnicate"});
+  EXPECT_THAT(unknown.ReadErrors(), HasSubstr("--frobnicate"));
+  EXPECT_EQ(unknown.Wait(), 2);
+}
+
+}  // namespace
+}  // namespace deform

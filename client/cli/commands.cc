@@ -10,6 +10,7 @@
   X(Show)                  \
   X(Delete)                \
   X(Weights)               \
+  X(Cage)                  \
   X(Picture)               \
   X(Verify)                \
   X(Completion)            \

@@ -48,6 +48,10 @@ constexpr Hint kHints[] = {
      "'deformctl list schemes' tells which take --cage and which --handles"},
     {"WRONG_LENGTH",
      "the file needs one entry, or vertex, for each of the original"},
+    {"MEMORY_LIMIT", "delete what is not needed, or raise the server's limit"},
+    {"SERVER_DRAINING", "the server is shutting down; try again later"},
+    {"SESSION_EXISTS", "choose another session id"},
+    {"NO_CAGE_FOUND", "try more --faces or another --margin"},
     {"UNKNOWN_MESH_FORMAT", "convert the file to one of these formats"},
 };
 

@@ -14,9 +14,11 @@ constexpr int kBarWidth = 30;
 
 }  // namespace
 
-Progress::Progress(Console& console, std::string label, Clock now)
+Progress::Progress(Console& console, std::string label,
+                   const Interruption* interruption, Clock now)
     : console_(console),
       label_(std::move(label)),
+      interruption_(interruption),
       now_(std::move(now)),
       start_(now_()),
       next_(start_ + (console.terminal() ? kPatience : kLine)) {}
@@ -51,7 +53,10 @@ void Progress::Show(int64_t done, int64_t total) {
 }
 
 ProgressCallback Progress::callback() {
-  return [this](int64_t done, int64_t total) { Show(done, total); };
+  return [this](int64_t done, int64_t total) {
+    Show(done, total);
+    return interruption_ == nullptr || !interruption_->requested;
+  };
 }
 
 }  // namespace deform::cli

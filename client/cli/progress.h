@@ -5,6 +5,7 @@
 #include <string>
 
 #include "client/cli/console.h"
+#include "client/cli/interruption.h"
 #include "client/cpp/client.h"
 
 namespace deform::cli {
@@ -15,8 +16,10 @@ class Progress {
  public:
   using Clock = std::function<std::chrono::steady_clock::time_point()>;
 
-  // `label`: "uploading". `now` is the time; tests pass their own.
+  // `label`: "uploading". `interruption`, which may be null, ends what is
+  // watched through callback(). `now` is the time; tests pass their own.
   Progress(Console& console, std::string label,
+           const Interruption* interruption,
            Clock now = std::chrono::steady_clock::now);
   ~Progress();
   Progress(const Progress&) = delete;
@@ -29,6 +32,7 @@ class Progress {
  private:
   Console& console_;
   const std::string label_;
+  const Interruption* const interruption_;
   const Clock now_;
   const std::chrono::steady_clock::time_point start_;
   std::chrono::steady_clock::time_point next_;

@@ -34,6 +34,7 @@ absl::StatusOr<std::unique_ptr<Stage>> Stage::Open(
         "say what is to be deformed: --model-file FILE with --cage FILE or "
         "--handles FILE, or --binding BINDING");
   }
+  context.interruption.expected = true;
   std::optional<MeshFile> model;
   if (!options.model_file.empty()) {
     DEFORM_ASSIGN_OR_RETURN(
@@ -61,7 +62,7 @@ absl::Status Stage::Bind(Context& context, const StageOptions& options) {
         model_, LoadMesh(options.model_file, ToFileDimension(dimension)));
   }
   DEFORM_ASSIGN_OR_RETURN(BindingSpec spec, LoadSpec(options.rig, dimension));
-  Progress uploading(context.console, "uploading");
+  Progress uploading(context.console, "uploading", &context.interruption);
   DEFORM_ASSIGN_OR_RETURN(
       const ModelInfo model,
       client_.RegisterModel(
@@ -70,7 +71,7 @@ absl::Status Stage::Bind(Context& context, const StageOptions& options) {
           uploading.callback()));
   if (!model.existed) our_model_ = model.model_id;
   spec.model_id = model.model_id;
-  Progress binding(context.console, "computing weights");
+  Progress binding(context.console, "computing weights", &context.interruption);
   DEFORM_ASSIGN_OR_RETURN(binding_,
                           client_.CreateBinding(spec, binding.callback()));
   if (!binding_.existed) our_binding_ = binding_.binding_id;

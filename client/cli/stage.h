@@ -25,7 +25,8 @@ struct StageOptions {
 // there. Not thread-safe.
 class Stage {
  public:
-  // Errors of files, arguments and the server.
+  // Errors of files, arguments and the server; Cancelled on Ctrl-C, which from
+  // now on waits for things to be tidied up.
   static absl::StatusOr<std::unique_ptr<Stage>> Open(
       Context& context, const StageOptions& options);
   // Deletes what Open() made, if Close() was not called.

@@ -134,7 +134,10 @@ absl::StatusOr<ModelInfo> Client::RegisterModel(
               static_cast<uInt>(count))));
     open = call->Write(request);
     offset += count;
-    if (open && progress) progress(offset, bytes.size());
+    if (open && progress && !progress(offset, bytes.size())) {
+      context.TryCancel();
+      break;
+    }
   }
   if (open) call->WritesDone();
   DEFORM_RETURN_IF_ERROR(FromGrpc(call->Finish()));
@@ -184,9 +187,11 @@ absl::StatusOr<BindingInfo> Client::CreateBinding(
   while (call->Read(&response)) {
     if (response.has_binding()) {
       info = FromProto(response.binding());
-    } else if (response.has_progress() && progress) {
-      progress(static_cast<int64_t>(response.progress().points_done()),
-               static_cast<int64_t>(response.progress().points_total()));
+    } else if (response.has_progress() && progress &&
+               !progress(
+                   static_cast<int64_t>(response.progress().points_done()),
+                   static_cast<int64_t>(response.progress().points_total()))) {
+      context.TryCancel();
     }
   }
   DEFORM_RETURN_IF_ERROR(FromGrpc(call->Finish()));

@@ -56,8 +56,9 @@ struct WeightRows {
 };
 
 // Done and total: bytes of an upload, points of a binding. Called on the
-// calling thread.
-using ProgressCallback = std::function<void(int64_t done, int64_t total)>;
+// calling thread. False gives up: the server stops and the call returns
+// Cancelled.
+using ProgressCallback = std::function<bool(int64_t done, int64_t total)>;
 
 // Thread-safe: one client serves all threads. Cheap to copy; copies share a
 // connection, which comes back by itself when the server does.

@@ -14,6 +14,10 @@ namespace {
 static_assert(std::endian::native == std::endian::little,
               "arrays are sent as they lie in memory");
 
+// Frames hold as many points as the server said at joining; this much memory is
+// never asked for at its word.
+constexpr uint64_t kMostPoints = uint64_t{1} << 31;
+
 // Beyond 2D and 3D, which the server refuses, three columns are sent.
 int Columns(int dimension) { return dimension == 2 ? 2 : 3; }
 
@@ -205,6 +209,7 @@ absl::StatusOr<WeightRows> FromProto(const v1::GetWeightsResponse& weights) {
 }
 
 absl::StatusOr<JoinedSession> FromProto(const v1::Joined& joined) {
+  if (joined.point_count() > kMostPoints) return BadAnswer("point_count");
   JoinedSession result{
       .session_id = joined.session().session_id(),
       .binding_id = joined.session().binding_id(),

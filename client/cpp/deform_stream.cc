@@ -51,7 +51,16 @@ absl::Status DeformStream::Impl::Join(const v1::Join& join) {
   return absl::OkStatus();
 }
 
+void DeformStream::Impl::Close() {
+  // gRPC ends the program if a stream is closed twice, or written to after.
+  if (!closed_) call_->WritesDone();
+  closed_ = true;
+}
+
 absl::StatusOr<uint64_t> DeformStream::Impl::Send(const PoseUpdate& update) {
+  if (closed_) {
+    return absl::FailedPreconditionError("no pose can follow Close()");
+  }
   v1::DeformRequest request;
   *request.mutable_pose() = ToProto(update, joined_.dimension, ++sequence_);
   if (!call_->Write(request)) {

@@ -77,7 +77,7 @@ class DeformStream {
 
   // Sends a pose, whole or in part, and returns its sequence number, counted
   // from 1. Blocks while the connection is full. An error means that the stream
-  // has ended; NextFrame() tells why.
+  // has ended, and NextFrame() tells why, or that Close() was called.
   absl::StatusOr<uint64_t> Send(const PoseUpdate& update);
 
   // Waits for the next frame and puts it into `frame`, whose memory is reused.
@@ -91,7 +91,8 @@ class DeformStream {
   uint64_t rejected_sequence() const;
   bool ended() const;
 
-  // Says that no more poses come. Frames still come until all are answered.
+  // Says that no more poses come; part of the sending side. Frames still come
+  // until all are answered.
   void Close();
   // Ends the stream at once; a waiting NextFrame() returns Cancelled.
   void Cancel();

@@ -26,7 +26,7 @@ class DeformStream::Impl {
   absl::Status NextFrame(Frame& frame);
   uint64_t rejected_sequence() const { return rejected_sequence_; }
   bool ended() const { return ended_; }
-  void Close() { call_->WritesDone(); }
+  void Close();
   void Cancel() { context_.TryCancel(); }
 
  private:
@@ -40,6 +40,7 @@ class DeformStream::Impl {
 
   // The sending thread's.
   uint64_t sequence_ = 0;
+  bool closed_ = false;
 
   // The receiving thread's.
   std::optional<FrameAssembler> assembler_;

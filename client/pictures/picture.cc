@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -248,13 +249,17 @@ absl::StatusOr<Image> DrawPicture(const Picture& picture) {
   const int count = static_cast<int>(picture.panels.size());
   Image image{picture.width * count, picture.height, {}};
   image.pixels.resize(static_cast<size_t>(image.width) * image.height);
-  for (int k = 0; k < count; ++k) {
+  const auto draw = [&](int k) {
     const Image panel = DrawPanel(picture, picture.panels[k], camera);
     for (int y = 0; y < panel.height; ++y) {
       std::copy_n(&panel.at(0, y), panel.width,
                   &image.at(k * picture.width, y));
     }
-  }
+  };
+  std::vector<std::thread> others;
+  for (int k = 1; k < count; ++k) others.emplace_back(draw, k);
+  draw(0);
+  for (std::thread& other : others) other.join();
   return image;
 }
 

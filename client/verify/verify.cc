@@ -101,8 +101,9 @@ std::vector<absl::StatusOr<CaseResult>> RunCases(
         results[i] = RunCase(client, cases[i], created);
       }
       ++done;
-      if (tells && options.progress) {
-        options.progress(done, static_cast<int64_t>(cases.size()));
+      if (tells && options.progress &&
+          !options.progress(done, static_cast<int64_t>(cases.size()))) {
+        return;
       }
     }
   };

@@ -377,6 +377,20 @@ TEST_F(Cli, VerifyDeletesNothingOfOthers) {
   EXPECT_TRUE(server_.client().GetModel(id).ok());
 }
 
+TEST_F(Cli, AnInterruptedPlayLeavesNothingBehind) {
+  std::ostringstream out;
+  std::ostringstream err;
+  Interruption interruption;
+  interruption.requested = true;
+  EXPECT_EQ(RunDeformctl(
+                {"--server", server_.address(), "play", "--motion", "bend",
+                 "--model-file", Path("ball.obj"), "--cage", Path("cube.obj")},
+                {out, err, false, interruption}),
+            kInterrupted);
+  EXPECT_TRUE(interruption.expected);
+  EXPECT_TRUE(ServerIsEmpty());
+}
+
 TEST_F(Cli, AnInterruptedVerifyLeavesNothingBehind) {
   Write("triangle.json", TriangleCase().dump());
   std::ostringstream out;

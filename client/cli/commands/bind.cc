@@ -20,10 +20,14 @@ absl::Status Run(const Options& options, Context& context) {
   DEFORM_ASSIGN_OR_RETURN(Client client, context.Connect());
   DEFORM_ASSIGN_OR_RETURN(const ModelInfo model,
                           client.GetModel(options.model));
-  DEFORM_ASSIGN_OR_RETURN(BindingSpec spec,
-                          LoadSpec(options.rig, model.dimension));
+  // Another --dimension than the model's is for the server to refuse.
+  DEFORM_ASSIGN_OR_RETURN(
+      BindingSpec spec,
+      LoadSpec(options.rig, options.rig.dimension != 0 ? options.rig.dimension
+                                                       : model.dimension));
   spec.model_id = options.model;
-  Progress progress(context.console, "computing weights");
+  Progress progress(context.console, "computing weights",
+                    &context.interruption);
   DEFORM_ASSIGN_OR_RETURN(const BindingInfo binding,
                           client.CreateBinding(spec, progress.callback()));
   Json json = ToJson(binding);

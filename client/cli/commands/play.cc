@@ -34,28 +34,42 @@ struct Options {
 class Script {
  public:
   static absl::StatusOr<Script> Create(const Options& options,
+                                       const RigArrays& rig,
                                        const Stage& stage) {
-    Script script;
+    Script script(options, rig);
     for (const std::string& path : options.poses) {
       DEFORM_ASSIGN_OR_RETURN(Positions pose, stage.LoadPose(path));
-      script.poses_.push_back(std::move(pose));
-    }
-    for (int64_t i = 0; options.poses.empty() && i < options.frames; ++i) {
-      const double time =
-          static_cast<double>(i + 1) / static_cast<double>(options.frames);
-      DEFORM_ASSIGN_OR_RETURN(Positions pose,
-                              PoseOfMotion(options.motion, stage.rig().vertices,
-                                           stage.rig().dimension, time));
-      script.poses_.push_back(std::move(pose));
+      script.loaded_.push_back(std::move(pose));
     }
     return script;
   }
 
-  int64_t size() const { return static_cast<int64_t>(poses_.size()); }
-  const Positions& at(int64_t i) const { return poses_[i]; }
+  int64_t size() const {
+    return loaded_.empty() ? options_.frames
+                           : static_cast<int64_t>(loaded_.size());
+  }
+  absl::StatusOr<PoseUpdate> Pose(int64_t i) const {
+    PoseUpdate update{.stretch_blend = options_.blend};
+    if (!loaded_.empty()) {
+      update.positions = loaded_[i];
+      return update;
+    }
+    // The last pose is at rest again.
+    const double time =
+        static_cast<double>(i + 1) / static_cast<double>(options_.frames);
+    DEFORM_ASSIGN_OR_RETURN(
+        update.positions,
+        PoseOfMotion(options_.motion, rig_.vertices, rig_.dimension, time));
+    return update;
+  }
 
  private:
-  std::vector<Positions> poses_;
+  Script(const Options& options, const RigArrays& rig)
+      : options_(options), rig_(rig) {}
+
+  const Options& options_;
+  const RigArrays& rig_;
+  std::vector<Positions> loaded_;
 };
 
 absl::Status PrepareDirectory(const std::string& path) {
@@ -130,17 +144,17 @@ absl::Status Run(const Options& options, Context& context) {
   if (options.poses.empty() == options.motion.empty()) {
     return UsageError("give pose files, or a built-in --motion");
   }
-  context.interruption.expected = true;
   DEFORM_RETURN_IF_ERROR(PrepareDirectory(options.out_dir));
   DEFORM_ASSIGN_OR_RETURN(const std::unique_ptr<Stage> stage,
                           Stage::Open(context, options.stage));
-  DEFORM_ASSIGN_OR_RETURN(const Script script, Script::Create(options, *stage));
+  DEFORM_ASSIGN_OR_RETURN(const Script script,
+                          Script::Create(options, stage->rig(), *stage));
   DEFORM_ASSIGN_OR_RETURN(
       DeformStream stream,
       stage->client().Deform(
           stage->session().session_id,
           options.delivery == "every" ? Delivery::kEvery : Delivery::kLatest));
-  Progress progress(context.console, "playing");
+  Progress progress(context.console, "playing", &context.interruption);
   const PlayOptions play{.poses = script.size(),
                          .in_flight = options.in_flight,
                          .rate = options.rate,
@@ -148,11 +162,7 @@ absl::Status Run(const Options& options, Context& context) {
   DEFORM_ASSIGN_OR_RETURN(
       const PlayReport report,
       Play(
-          stream, play,
-          [&](int64_t i) -> absl::StatusOr<PoseUpdate> {
-            return PoseUpdate{.positions = script.at(i),
-                              .stretch_blend = options.blend};
-          },
+          stream, play, [&](int64_t i) { return script.Pose(i); },
           [&](const Frame& frame) {
             progress.Show(static_cast<int64_t>(frame.answers_sequence),
                           script.size());

@@ -27,7 +27,7 @@ absl::Status Run(const Options& options, Context& context) {
       options.name.empty()
           ? std::filesystem::path(options.file).filename().string()
           : options.name;
-  Progress progress(context.console, "uploading");
+  Progress progress(context.console, "uploading", &context.interruption);
   DEFORM_ASSIGN_OR_RETURN(
       const ModelInfo model,
       client.RegisterModel({file.dimension, file.positions, file.faces}, name,

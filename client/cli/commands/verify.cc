@@ -123,7 +123,7 @@ void Print(const VerifyOutcome& outcome, std::ostream& out) {
 absl::Status Run(const Options& options, Context& context) {
   DEFORM_ASSIGN_OR_RETURN(Client client, context.Connect());
   context.interruption.expected = true;
-  Progress progress(context.console, "verifying");
+  Progress progress(context.console, "verifying", &context.interruption);
   const absl::StatusOr<VerifyOutcome> outcome =
       Verify(client, {.directory = options.directory,
                       .group_prefix = options.group,

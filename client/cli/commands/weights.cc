@@ -76,7 +76,7 @@ absl::Status ForRows(
     Client& client, const Options& options, const BindingInfo& binding,
     Console& console,
     absl::FunctionRef<void(int64_t, const WeightRows&, int64_t)> row) {
-  Progress progress(console, "fetching weights");
+  Progress progress(console, "fetching weights", nullptr);
   const int64_t total =
       options.count > 0 ? options.count : binding.point_count - options.first;
   return client.GetWeights(

@@ -8,6 +8,8 @@
 
 #include "client/cli/command.h"
 #include "client/cli/exit_code.h"
+#include "core/files/mesh_file.h"
+#include "core/mesh/cage.h"
 #include "tests/client/cli/cli_run.h"
 
 namespace deform::cli {
@@ -139,6 +141,13 @@ INSTANTIATE_TEST_SUITE_P(
          {"weights", "b", "--format", "binary"},
          "--format binary needs --out"},
         {"WeightsFirst", {"weights", "b", "--first", "-1"}, "--first"},
+        {"CageWithoutOut", {"cage", "a.obj"}, "--out is required"},
+        {"CageFaces",
+         {"cage", "a.obj", "--out", "b", "--faces", "7"},
+         "7 not in range"},
+        {"CageMargin",
+         {"cage", "a.obj", "--out", "b", "--margin", "2"},
+         "2 not in range"},
         {"PictureWithoutOut", {"picture", "a.obj"}, "--out is required"},
         {"PictureSize",
          {"picture", "a.obj", "--out", "b", "--width", "5000"},
@@ -210,6 +219,25 @@ TEST(Files, AreReadBeforeTheServerIsAsked) {
   const CliResult missing = RunCli({"register", "/nonexistent.obj"});
   EXPECT_EQ(missing.exit_code, kBadFile);
   EXPECT_THAT(missing.err, HasSubstr("/nonexistent.obj"));
+}
+
+TEST(Cage, IsMadeWithoutAServer) {
+  const std::string path = testing::TempDir() + "/cube_cage.obj";
+  const CliResult result =
+      RunCli({"cage", CubeObj(), "--faces", "60", "--out", path, "--json"});
+  ASSERT_EQ(result.exit_code, kOk) << result.out;
+  const MeshFile cage = ReadMeshFile(path).value();
+  EXPECT_EQ(cage.faces.rows(), result.json()["face_count"]);
+  EXPECT_TRUE(Cage::Create(3, cage.positions, cage.faces).ok());
+}
+
+TEST(Cage, SaysWhyThereIsNone) {
+  const std::string out = testing::TempDir() + "/x.obj";
+  const CliResult point =
+      RunCli({"cage", WriteTemporary("point.obj", "v 1 2 3\n"), "--out", out});
+  EXPECT_EQ(point.exit_code, kBadFile);
+  EXPECT_THAT(point.err, HasSubstr("(MODEL_WITHOUT_EXTENT)"));
+  EXPECT_THAT(point.err, HasSubstr("point.obj: "));
 }
 
 TEST(Picture, IsDrawnWithoutAServer) {

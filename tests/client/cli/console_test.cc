@@ -109,7 +109,7 @@ class ProgressTest : public testing::Test {
     Console console(out, err, false, terminal);
     std::chrono::steady_clock::time_point now;
     {
-      Progress progress(console, "binding", [&] { return now; });
+      Progress progress(console, "binding", nullptr, [&] { return now; });
       for (int i = 1; i <= 10; ++i) {
         now += step;
         progress.Show(i, 10);

@@ -136,6 +136,8 @@ TEST(JoinedMessage, NeedsAPoseOfItsVertexCount) {
   EXPECT_FALSE(FromProto(joined).ok());
   joined.set_vertex_count(1);
   EXPECT_EQ(FromProto(joined).value().pose.vertices(0, 2), 2);
+  joined.set_point_count(~uint64_t{0});
+  EXPECT_FALSE(FromProto(joined).ok());
 }
 
 }  // namespace

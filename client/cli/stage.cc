@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/files.h"
@@ -111,11 +112,22 @@ absl::StatusOr<Positions> Stage::LoadPose(const std::string& path) const {
                                           rig_.vertices.rows())));
 }
 
-absl::StatusOr<std::string> Stage::FileWith(const Positions& positions) const {
-  if (!model_) return ObjText(positions, Faces(0, 3));
-  absl::StatusOr<std::string> bytes = WithPositions(*model_, positions);
-  if (!bytes.ok()) return WithExit(kBadFile, bytes.status());
-  return bytes;
+absl::StatusOr<std::string> Stage::FileWith(const Positions& positions,
+                                            const std::string& path) const {
+  const std::string extension =
+      absl::AsciiStrToLower(std::filesystem::path(path).extension().string());
+  if (model_ && extension == absl::StrCat(".", model_->format)) {
+    absl::StatusOr<std::string> bytes = WithPositions(*model_, positions);
+    if (!bytes.ok()) return WithExit(kBadFile, bytes.status());
+    return bytes;
+  }
+  if (extension == ".obj") {
+    return ObjText(positions, model_ ? model_->faces : Faces(0, 3));
+  }
+  return UsageError(absl::StrCat(
+      path, ": the result can be written as .obj",
+      model_ ? absl::StrCat(" or, like its source, as .", model_->format)
+             : "; other formats need --model-file"));
 }
 
 absl::Status Stage::Close() {

@@ -42,9 +42,11 @@ class Stage {
   // The posed rig that a file holds.
   absl::StatusOr<Positions> LoadPose(const std::string& path) const;
 
-  // The bytes of the deformed model: its file with the positions replaced, or,
-  // without a file, an OBJ of bare points.
-  absl::StatusOr<std::string> FileWith(const Positions& positions) const;
+  // The bytes of the deformed model for a file at `path`: with the extension of
+  // the model's file that file with its positions replaced, as .obj the bare
+  // geometry. A usage error otherwise.
+  absl::StatusOr<std::string> FileWith(const Positions& positions,
+                                       const std::string& path) const;
 
   // Deletes what Open() made: always the session, and unless it is to be kept
   // the binding and the model.

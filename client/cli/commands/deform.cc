@@ -7,6 +7,7 @@
 #include "client/cli/command.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/files.h"
+#include "client/cli/motion.h"
 #include "client/cli/picture_options.h"
 #include "client/cli/stage.h"
 #include "core/base/status_macros.h"
@@ -17,11 +18,19 @@ namespace {
 struct Options {
   StageOptions stage;
   std::string pose;
+  std::string motion;
+  double at = 0.25;
   double blend = 1;
   std::string out;
   std::string png;
   PictureOptions picture;
 };
+
+absl::StatusOr<Positions> PoseOf(const Options& options, const Stage& stage) {
+  if (options.motion.empty()) return stage.LoadPose(options.pose);
+  return PoseOfMotion(options.motion, stage.rig().vertices,
+                      stage.rig().dimension, options.at);
+}
 
 absl::StatusOr<Frame> DeformOnce(Stage& stage, const PoseUpdate& pose) {
   DEFORM_ASSIGN_OR_RETURN(
@@ -83,15 +92,20 @@ absl::Status Run(const Options& options, Context& context) {
   if (!options.png.empty() && options.stage.model_file.empty()) {
     return UsageError("--png needs --model-file, for the faces to draw");
   }
+  if (options.pose.empty() == options.motion.empty()) {
+    return UsageError(
+        "give the posed rig, --pose FILE, or a built-in --motion");
+  }
   DEFORM_ASSIGN_OR_RETURN(const std::unique_ptr<Stage> stage,
                           Stage::Open(context, options.stage));
-  DEFORM_ASSIGN_OR_RETURN(const Positions pose, stage->LoadPose(options.pose));
+  DEFORM_ASSIGN_OR_RETURN(const Positions pose, PoseOf(options, *stage));
   DEFORM_ASSIGN_OR_RETURN(
       const Frame frame,
       DeformOnce(*stage, {.positions = pose, .stretch_blend = options.blend}));
   const Positions deformed = frame.DoublePositions();
   if (!options.out.empty()) {
-    DEFORM_ASSIGN_OR_RETURN(const std::string bytes, stage->FileWith(deformed));
+    DEFORM_ASSIGN_OR_RETURN(const std::string bytes,
+                            stage->FileWith(deformed, options.out));
     DEFORM_RETURN_IF_ERROR(WriteFile(options.out, bytes));
   }
   if (!options.png.empty()) {
@@ -105,14 +119,20 @@ Action Setup(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   app.add_option("--pose", options->pose,
                  "Posed cage or handles: a file with the rig's vertices, moved")
-      ->required()
       ->type_name("FILE");
+  app.add_option("--motion", options->motion,
+                 "Instead of a file: twist, bend, stretch or pulse the rig")
+      ->check(CLI::IsMember({"twist", "bend", "stretch", "pulse"}));
+  app.add_option("--at", options->at,
+                 "Time of the motion; it begins and ends at rest, at 0 and 1")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
   app.add_option("--blend", options->blend,
                  "Stretch blend: 1 distorts least, 0 stretches freely")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--out", options->out,
-                 "The model's file with its positions replaced")
+                 "The model's file with its positions replaced; or .obj")
       ->type_name("FILE");
   app.add_option("--png", options->png, "Picture of rest and posed state")
       ->type_name("FILE");
@@ -130,6 +150,9 @@ const Command& DeformCommand() {
       "--out out.obj\n"
       "deformctl deform --model-file a.ply --handles h.obj --pose moved.obj "
       "--png out.png\n"
+      "deformctl deform --model-file a.stl --cage c.obj --motion bend --at "
+      "0.25 "
+      "--out out.obj\n"
       "deformctl deform --binding $binding --model-file a.obj --pose posed.obj "
       "--out out.obj",
       "", Setup};

@@ -90,8 +90,9 @@ absl::Status WriteFrame(const Options& options, const Stage& stage,
   const std::filesystem::path path =
       std::filesystem::path(options.out_dir) /
       absl::StrFormat("frame_%04d.%s", frame.answers_sequence, extension);
-  DEFORM_ASSIGN_OR_RETURN(const std::string bytes,
-                          stage.FileWith(frame.DoublePositions()));
+  DEFORM_ASSIGN_OR_RETURN(
+      const std::string bytes,
+      stage.FileWith(frame.DoublePositions(), path.string()));
   return WriteFile(path.string(), bytes);
 }
 

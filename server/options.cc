@@ -186,6 +186,12 @@ std::string Format(const Bytes& value) {
   return absl::StrCat("\"", FormatExactly(value), "\"");
 }
 
+// What stands for the value in --help.
+const char* TypeName(const std::string&) { return "TEXT"; }
+const char* TypeName(int64_t) { return "NUMBER"; }
+const char* TypeName(const Seconds&) { return "SECONDS"; }
+const char* TypeName(const Bytes&) { return "BYTES"; }
+
 double NumberOf(int64_t value) { return static_cast<double>(value); }
 double NumberOf(const Seconds& value) { return value.value; }
 double NumberOf(const Bytes& value) { return static_cast<double>(value.value); }
@@ -272,7 +278,8 @@ void AddFlags(CLI::App& app, CommandLine& line, std::string& config) {
   app.set_version_flag("--version", DEFORM_VERSION);
   app.add_option("--config", config,
                  "TOML file with the options below, by the same names. Flags "
-                 "win.");
+                 "win.")
+      ->type_name("FILE");
   app.add_flag("--config-check", line.check_only,
                "Print the effective configuration as TOML and exit.");
   VisitOptions(line.options, [&app](const std::string& name, auto& value,
@@ -291,7 +298,8 @@ void AddFlags(CLI::App& app, CommandLine& line, std::string& config) {
           "--" + name,
           [set](int64_t count) { set(count > 0 ? "true" : "false"); }, help);
     } else {
-      app.add_option_function<std::string>("--" + name, set, help);
+      app.add_option_function<std::string>("--" + name, set, help)
+          ->type_name(TypeName(value));
     }
   });
 }

@@ -166,6 +166,7 @@ void DeformReactor::StartNextWrite() {
     v1::DeformResponse response;
     *response.mutable_joined() = *std::move(joined_);
     joined_.reset();
+    participant_->Progressed();
     Write(response);
     return;
   }
@@ -232,6 +233,7 @@ void DeformReactor::OnCancel() {
 
 void DeformReactor::CheckStall(TimePoint now) {
   MutexLock lock(mutex_);
+  if (done_) return;
   const bool overdue = deadline_ && now >= *deadline_;
   if (finished_) {
     if (overdue) context_->TryCancel();
@@ -255,6 +257,7 @@ void DeformReactor::OnDone() {
                       poses_, " poses, ", frames_, " frames,");
     }
     status = *finished_;
+    done_ = true;
   }
   LogCall(call, context_->peer(), status,
           streams_.sessions_.clock()() - begin_);

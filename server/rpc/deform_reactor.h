@@ -111,6 +111,8 @@ class DeformReactor final
   bool half_closed_ ABSL_GUARDED_BY(mutex_) = false;
   // Set by Finish().
   std::optional<absl::Status> finished_ ABSL_GUARDED_BY(mutex_);
+  // Set by OnDone(), after which the context is gone.
+  bool done_ ABSL_GUARDED_BY(mutex_) = false;
   // When patience ends: with joining, then with ending.
   std::optional<TimePoint> deadline_ ABSL_GUARDED_BY(mutex_);
   uint64_t poses_ ABSL_GUARDED_BY(mutex_) = 0;

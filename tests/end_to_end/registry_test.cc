@@ -194,6 +194,7 @@ TEST(Bindings, TellProgressAndThenTheBinding) {
         EXPECT_GE(done, last);
         EXPECT_EQ(total, model.vertex_count);
         last = done;
+        return true;
       });
   EXPECT_TRUE(binding.ok());
   EXPECT_GE(last, 0);

@@ -22,7 +22,7 @@ namespace deform::cli {
 struct Globals {
   std::string server = "127.0.0.1:7777";
   std::string tenant;
-  double connect_timeout_s = 5;
+  double connect_timeout_s = 3;
   bool json = false;
 };
 

@@ -40,16 +40,16 @@ absl::StatusOr<Positions> LoadSameCount(const std::string& path, int dimension,
 absl::StatusOr<Picture> Load(const Options& options) {
   Picture picture;
   DEFORM_ASSIGN_OR_RETURN(
+      MeshFile model,
+      LoadMesh(options.model, ToFileDimension(options.dimension)));
+  DEFORM_ASSIGN_OR_RETURN(
       picture.dimension,
       ChooseDimension({.cage = options.cage, .dimension = options.dimension},
-                      2));
-  DEFORM_ASSIGN_OR_RETURN(
-      MeshFile model,
-      LoadMesh(options.model,
-               ToFileDimension(options.dimension != 0 || picture.dimension == 3
-                                   ? picture.dimension
-                                   : 0)));
-  picture.dimension = model.dimension;
+                      model.dimension));
+  if (picture.dimension != model.dimension) {
+    DEFORM_ASSIGN_OR_RETURN(
+        model, LoadMesh(options.model, ToFileDimension(picture.dimension)));
+  }
   picture.faces = model.faces;
   RigArrays cage;
   cage.vertices.resize(0, 3);

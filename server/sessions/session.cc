@@ -42,8 +42,9 @@ Session::Session(std::string id, BindingCatalogue::Lease binding,
 
 int64_t Session::BytesFor(const Binding& binding) {
   const int64_t columns = binding.weights().columns();
-  // Displacements and two frames of float; columns and a few poses of double.
-  return 3 * binding.point_count() * 3 * int64_t{sizeof(float)} +
+  // Displacements of double, two frames of float, columns and a few poses.
+  return binding.point_count() * 3 *
+             int64_t{sizeof(double) + 2 * sizeof(float)} +
          6 * columns * 3 * int64_t{sizeof(double)};
 }
 

@@ -1,6 +1,6 @@
 // Encoding "float32": little-endian float32, `dimension` per vertex.
+#include <algorithm>
 #include <bit>
-#include <cstring>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/error.h"
@@ -22,7 +22,9 @@ class Float32 final : public FrameEncoding {
 
   int64_t Encode(std::span<const float> positions, int /*dimension*/,
                  uint8_t* out) const override {
-    std::memcpy(out, positions.data(), positions.size_bytes());
+    // Not memcpy: an empty span may have no address.
+    std::copy_n(reinterpret_cast<const uint8_t*>(positions.data()),
+                positions.size_bytes(), out);
     return static_cast<int64_t>(positions.size_bytes());
   }
 
@@ -34,7 +36,8 @@ class Float32 final : public FrameEncoding {
           absl::StrCat("chunk has ", bytes.size(), " bytes, its vertices need ",
                        positions.size_bytes()));
     }
-    std::memcpy(positions.data(), bytes.data(), bytes.size());
+    std::copy_n(bytes.data(), bytes.size(),
+                reinterpret_cast<uint8_t*>(positions.data()));
     return absl::OkStatus();
   }
 };

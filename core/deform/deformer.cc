@@ -1,6 +1,7 @@
 #include "core/deform/deformer.h"
 
 #include <algorithm>
+#include <cassert>
 #include <utility>
 
 #include "core/kernels/apply_weights.h"
@@ -16,15 +17,6 @@ constexpr int64_t kTilesPerBlock = 256;
 constexpr int64_t kParallelProducts = 1 << 18;
 // Sums gather a rounding of 1e-16 D a step; after so many they are made anew.
 constexpr int kMaxSteps = 4096;
-
-// The residual of column c under `map`: v' - T v, or s n' - A n.
-Vec3 Residual(const AffineMap& map, const PosedColumns& posed,
-              const Columns& columns, int64_t c) {
-  const Vec3 rest = posed.rest().row(c).transpose();
-  const Vec3 now = columns.row(c).transpose();
-  return c < posed.vertex_count() ? Vec3(now - map(rest))
-                                  : Vec3(now - map.linear * rest);
-}
 
 }  // namespace
 
@@ -42,27 +34,55 @@ Deformer::Deformer(std::shared_ptr<const Binding> binding, ThreadPool* pool)
 }
 
 DeformReport Deformer::MoveTo(const Pose& pose, Path path) {
+  DeformJob job{.deformer = this, .pose = &pose, .path = path};
+  MoveTogether({&job, 1}, pool_);
+  return job.report;
+}
+
+Deformer::Change Deformer::Begin(const Pose& pose, Path path) {
+  Change change;
   const std::vector<int32_t> moved = MovedVertices(pose);
   Columns next = columns_;
-  const std::vector<int32_t> changed = posed_columns_.Update(pose, moved, next);
+  change.columns = posed_columns_.Update(pose, moved, next);
   pose_ = pose;
-  DeformReport report;
-  report.full = path == Path::kFull || PrefersFull(changed, next);
-  if (report.full) {
+  change.full = path == Path::kFull || PrefersFull(change.columns, next);
+  if (change.full) {
     posed_columns_.UpdateAll(pose, columns_);
-    ApplyAll();
-    report.columns_applied = columns_.rows();
-  } else {
-    ApplyChanged(changed, next);
-    columns_ = std::move(next);
-    report.columns_applied = static_cast<int64_t>(changed.size());
+    map_ = FitSimilarity(RestVertices(binding_->rig()), pose_.vertices,
+                         binding_->dimension());
+    steps_since_full_ = 0;
+    return change;
   }
+  for (const int32_t c : change.columns) {
+    for (int d = 0; d < 3; ++d) {
+      change.deltas.push_back(next(c, d) - columns_(c, d));
+    }
+  }
+  columns_ = std::move(next);
+  steps_since_full_ += change.columns.empty() ? 0 : 1;
+  return change;
+}
+
+DeformReport Deformer::Report(const Change& change) const {
+  DeformReport report;
+  report.full = change.full;
+  report.columns_applied = change.full
+                               ? columns_.rows()
+                               : static_cast<int64_t>(change.columns.size());
   if (const Cage* cage = std::get_if<Cage>(&binding_->rig());
       cage != nullptr && binding_->scheme().uses_normals()) {
     report.exit_mismatch =
         ExitMismatch(*cage, binding_->exit_parts(), posed_columns_, columns_);
   }
   return report;
+}
+
+// The residual of column c: v' - T v, or s n' - A n.
+Vec3 Deformer::Residual(const Columns& columns, int64_t c) const {
+  const Vec3 rest = posed_columns_.rest().row(c).transpose();
+  const Vec3 now = columns.row(c).transpose();
+  return c < posed_columns_.vertex_count() ? Vec3(now - map_(rest))
+                                           : Vec3(now - map_.linear * rest);
 }
 
 std::vector<int32_t> Deformer::MovedVertices(const Pose& pose) const {
@@ -87,60 +107,9 @@ bool Deformer::PrefersFull(const std::vector<int32_t>& changed,
   // pose further off its map than that, fit it anew.
   const double limit = 2 * BoxOf(pose_.vertices).diagonal();
   for (int64_t v = 0; v < posed_columns_.vertex_count(); ++v) {
-    if (!(Residual(map_, posed_columns_, next, v).norm() <= limit)) return true;
+    if (!(Residual(next, v).norm() <= limit)) return true;
   }
   return false;
-}
-
-void Deformer::ApplyAll() {
-  steps_since_full_ = 0;
-  map_ = FitSimilarity(RestVertices(binding_->rig()), pose_.vertices,
-                       binding_->dimension());
-  std::vector<float> residuals(columns_.rows() * 3);
-  for (int64_t c = 0; c < columns_.rows(); ++c) {
-    const Vec3 residual = Residual(map_, posed_columns_, columns_, c);
-    for (int d = 0; d < 3; ++d) {
-      residuals[c * 3 + d] = static_cast<float>(residual(d));
-    }
-  }
-  ForEachBlock([&](int64_t first, int64_t count) {
-    std::vector<float> sums(count * kTileSums);
-    ApplyTiles(binding_->weights().tile(first), count, columns_.rows(), 1,
-               residuals.data(), sums.data());
-    std::copy(sums.begin(), sums.end(),
-              displacement_.data() + first * kTileSums);
-  });
-}
-
-void Deformer::ApplyChanged(const std::vector<int32_t>& changed,
-                            const Columns& next) {
-  if (changed.empty()) return;
-  ++steps_since_full_;
-  std::vector<double> deltas;
-  deltas.reserve(changed.size() * 3);
-  for (const int32_t c : changed) {
-    for (int d = 0; d < 3; ++d) deltas.push_back(next(c, d) - columns_(c, d));
-  }
-  ForEachBlock([&](int64_t first, int64_t count) {
-    AddTileColumns(binding_->weights().tile(first), count, columns_.rows(),
-                   changed.data(), static_cast<int64_t>(changed.size()),
-                   deltas.data(), displacement_.data() + first * kTileSums);
-  });
-}
-
-void Deformer::ForEachBlock(absl::FunctionRef<void(int64_t, int64_t)> body) {
-  const int64_t tiles = binding_->weights().tiles();
-  const auto block = [&](int64_t b) {
-    const int64_t first = b * kTilesPerBlock;
-    body(first, std::min(kTilesPerBlock, tiles - first));
-  };
-  const int64_t blocks = (tiles + kTilesPerBlock - 1) / kTilesPerBlock;
-  const int64_t products = tiles * kTilePoints * columns_.rows();
-  if (pool_ != nullptr && blocks > 1 && products > kParallelProducts) {
-    pool_->ParallelFor(blocks, nullptr, block);
-  } else {
-    for (int64_t b = 0; b < blocks; ++b) block(b);
-  }
 }
 
 Vec3 Deformer::PointAt(int64_t point) const {
@@ -165,6 +134,97 @@ void Deformer::CopyRelative(int64_t first, int64_t count, const Vec3& origin,
     for (int d = 0; d < dimension; ++d) {
       out[i * dimension + d] = static_cast<float>(relative(d));
     }
+  }
+}
+
+// The sums of several deformers of one binding, in one walk over its weights.
+class JointPass {
+ public:
+  explicit JointPass(const WeightTiles& weights) : weights_(weights) {}
+
+  void Add(Deformer& deformer, const Deformer::Change& change) {
+    if (change.full) {
+      full_.push_back(&deformer);
+    } else if (!change.columns.empty()) {
+      stepping_.emplace_back(&deformer, &change);
+    }
+  }
+
+  void Run(ThreadPool* pool) {
+    if (full_.empty() && stepping_.empty()) return;
+    PackResiduals();
+    const int64_t tiles = weights_.tiles();
+    const int64_t blocks = (tiles + kTilesPerBlock - 1) / kTilesPerBlock;
+    const int64_t products = tiles * kTilePoints * weights_.columns();
+    const auto block = [&](int64_t b) {
+      const int64_t first = b * kTilesPerBlock;
+      const int64_t count = std::min(kTilesPerBlock, tiles - first);
+      ApplyAll(first, count);
+      ApplyChanges(first, count);
+    };
+    if (pool != nullptr && blocks > 1 && products > kParallelProducts) {
+      pool->ParallelFor(blocks, nullptr, block);
+    } else {
+      for (int64_t b = 0; b < blocks; ++b) block(b);
+    }
+  }
+
+ private:
+  void PackResiduals() {
+    residuals_.reserve(weights_.columns() * full_.size() * 3);
+    for (int64_t c = 0; c < weights_.columns(); ++c) {
+      for (const Deformer* deformer : full_) {
+        const Vec3 residual = deformer->Residual(deformer->columns_, c);
+        for (int d = 0; d < 3; ++d) {
+          residuals_.push_back(static_cast<float>(residual(d)));
+        }
+      }
+    }
+  }
+
+  void ApplyAll(int64_t first, int64_t count) const {
+    const auto sets = static_cast<int64_t>(full_.size());
+    if (sets == 0) return;
+    std::vector<float> sums(count * sets * kTileSums);
+    ApplyTiles(weights_.tile(first), count, weights_.columns(), sets,
+               residuals_.data(), sums.data());
+    for (int64_t s = 0; s < sets; ++s) {
+      for (int64_t t = 0; t < count; ++t) {
+        std::copy_n(sums.data() + (t * sets + s) * kTileSums, kTileSums,
+                    full_[s]->displacement_.data() + (first + t) * kTileSums);
+      }
+    }
+  }
+
+  void ApplyChanges(int64_t first, int64_t count) const {
+    for (const auto& [deformer, change] : stepping_) {
+      AddTileColumns(weights_.tile(first), count, weights_.columns(),
+                     change->columns.data(),
+                     static_cast<int64_t>(change->columns.size()),
+                     change->deltas.data(),
+                     deformer->displacement_.data() + first * kTileSums);
+    }
+  }
+
+  const WeightTiles& weights_;
+  std::vector<Deformer*> full_;
+  std::vector<float> residuals_;  // columns x full_ x 3
+  std::vector<std::pair<Deformer*, const Deformer::Change*>> stepping_;
+};
+
+void MoveTogether(std::span<DeformJob> jobs, ThreadPool* pool) {
+  if (jobs.empty()) return;
+  std::vector<Deformer::Change> changes;
+  changes.reserve(jobs.size());  // The pass points to them.
+  JointPass pass(jobs.front().deformer->binding().weights());
+  for (DeformJob& job : jobs) {
+    assert(&job.deformer->binding() == &jobs.front().deformer->binding());
+    changes.push_back(job.deformer->Begin(*job.pose, job.path));
+    pass.Add(*job.deformer, changes.back());
+  }
+  pass.Run(pool);
+  for (size_t k = 0; k < jobs.size(); ++k) {
+    jobs[k].report = jobs[k].deformer->Report(changes[k]);
   }
 }
 

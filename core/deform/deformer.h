@@ -10,9 +10,9 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
-#include "absl/functional/function_ref.h"
 #include "core/base/thread_pool.h"
 #include "core/deform/affine_map.h"
 #include "core/deform/columns.h"
@@ -30,6 +30,8 @@ struct DeformReport {
   // ExitMismatch().
   double exit_mismatch = 0;
 };
+
+struct DeformJob;
 
 // Not thread-safe: one session, one Deformer.
 class Deformer {
@@ -57,15 +59,26 @@ class Deformer {
                     float* out) const;
 
  private:
+  friend void MoveTogether(std::span<DeformJob> jobs, ThreadPool* pool);
+  friend class JointPass;
+
+  // What a step does to the sums: adds columns x deltas, or, if full, makes
+  // them anew.
+  struct Change {
+    bool full = false;
+    std::vector<int32_t> columns;
+    std::vector<double> deltas;  // 3 a column.
+  };
+
+  // Everything of a step but the sums.
+  Change Begin(const Pose& pose, Path path);
+  DeformReport Report(const Change& change) const;
   // The rows of `pose` that differ from the current one; all if the stretch
   // blend does.
   std::vector<int32_t> MovedVertices(const Pose& pose) const;
   bool PrefersFull(const std::vector<int32_t>& changed,
                    const Columns& next) const;
-  void ApplyAll();
-  void ApplyChanged(const std::vector<int32_t>& changed, const Columns& next);
-  // Calls body(first tile, count) for runs of tiles, on the pool if that pays.
-  void ForEachBlock(absl::FunctionRef<void(int64_t, int64_t)> body);
+  Vec3 Residual(const Columns& columns, int64_t c) const;
   Vec3 PointAt(int64_t point) const;
 
   const std::shared_ptr<const Binding> binding_;
@@ -79,5 +92,19 @@ class Deformer {
   int steps_since_full_ = 0;
   std::vector<double> displacement_;  // tiles x kTileSums: the sums above.
 };
+
+// One step of one of several sessions.
+struct DeformJob {
+  Deformer* deformer = nullptr;
+  const Pose* pose = nullptr;  // Right (CheckPoseUpdate).
+  Deformer::Path path = Deformer::Path::kAutomatic;
+  DeformReport report;  // Filled in.
+};
+
+// Deformer::MoveTo() for different deformers of the same Binding in one walk
+// over its weights, which costs a session a fraction of a walk of its own. The
+// results are those of MoveTo(), to the rounding of float sums. All is
+// borrowed; `pool` may be null.
+void MoveTogether(std::span<DeformJob> jobs, ThreadPool* pool);
 
 }  // namespace deform

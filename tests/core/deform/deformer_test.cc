@@ -259,5 +259,44 @@ TEST(Deformer, UsesItsPoolWithoutChangingABit) {
   EXPECT_EQ(one.positions(), many.positions());
 }
 
+TEST(MoveTogether, IsMoveToForEachOfSeveralSessions) {
+  const auto binding = InBox(5000);
+  ThreadPool pool({.threads = 3});
+  const double diagonal = DiagonalOf(binding->rig());
+  for (const size_t sessions : {1, 2, 5, 9}) {
+    std::vector<std::unique_ptr<Deformer>> together, alone;
+    for (size_t k = 0; k < sessions; ++k) {
+      together.push_back(std::make_unique<Deformer>(binding, nullptr));
+      alone.push_back(std::make_unique<Deformer>(binding, nullptr));
+    }
+    for (unsigned round = 0; round < 4; ++round) {
+      std::vector<Pose> poses;
+      for (size_t k = 0; k < sessions; ++k) {
+        // Some jump, some move one vertex, some stay.
+        Pose pose = together[k]->pose();
+        if ((round + k) % 3 == 0) pose = RandomPose(*binding, round * 10 + k);
+        if ((round + k) % 3 == 1) pose.vertices(3, 1) += 0.1;
+        poses.push_back(pose);
+      }
+      std::vector<DeformJob> jobs;
+      for (size_t k = 0; k < sessions; ++k) {
+        jobs.push_back({.deformer = together[k].get(), .pose = &poses[k]});
+      }
+      MoveTogether(jobs, &pool);
+      for (size_t k = 0; k < sessions; ++k) {
+        const DeformReport report = alone[k]->MoveTo(poses[k]);
+        EXPECT_EQ(jobs[k].report.full, report.full);
+        EXPECT_EQ(jobs[k].report.columns_applied, report.columns_applied);
+        // Float sums of 20 columns, in another order.
+        EXPECT_LT(
+            LargestDifference(together[k]->positions(), alone[k]->positions()),
+            5e-7 * diagonal);
+      }
+    }
+  }
+}
+
+TEST(MoveTogether, OfNobodyDoesNothing) { MoveTogether({}, nullptr); }
+
 }  // namespace
 }  // namespace deform

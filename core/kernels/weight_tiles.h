@@ -2,14 +2,24 @@
 // of a tile behind each other, so that a tile is one forward walk.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <limits>
 #include <memory>
 #include <span>
 
 namespace deform {
 
 inline constexpr int64_t kTilePoints = 16;
+
+// As a tile holds it: infinity, of the same sign, if float cannot.
+inline float RoundedWeight(double weight) {
+  return std::abs(weight) <= std::numeric_limits<float>::max()
+             ? static_cast<float>(weight)
+             : std::copysign(std::numeric_limits<float>::infinity(),
+                             static_cast<float>(weight > 0 ? 1 : -1));
+}
 
 // `points` x `columns` float weights, 64-byte aligned, zero where not set. The
 // last tile is padded with points of weight 0.
@@ -37,6 +47,10 @@ class WeightTiles {
   void set(int64_t point, int64_t column, float value) {
     tile(point / kTilePoints)[column * kTilePoints + point % kTilePoints] =
         value;
+  }
+  // Sets all weights of a point to 0.
+  void Clear(int64_t point) {
+    for (int64_t c = 0; c < columns_; ++c) set(point, c, 0);
   }
 
  private:

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
-#include <limits>
+#include <cmath>
 #include <numeric>
 #include <tuple>
 #include <utility>
@@ -14,6 +14,7 @@
 #include "core/base/error.h"
 #include "core/base/mutex.h"
 #include "core/base/status_macros.h"
+#include "core/kernels/measure_weights.h"
 #include "core/weights/blocks.h"
 #include "core/weights/cage_faces.h"
 #include "core/weights/unbindable.h"
@@ -67,13 +68,12 @@ class Binder {
   void Finish();
 
  private:
-  using Row = Eigen::Ref<const Eigen::RowVectorXd>;
-
   const Positions& points() const { return parts_.model->positions(); }
   // False if cancelled.
   bool ForEach(int64_t count, absl::FunctionRef<void(int64_t)> body) const;
-  // Rounds a row to float and measures it.
-  void Store(int64_t point, Row vertex, Row normal, Figures& figures);
+  // Measures the points of a block that `wanted` names.
+  void Measure(Block at, absl::FunctionRef<bool(int64_t point)> wanted,
+               Figures& figures);
   void EvaluateBlock(Block at);
   void ExtendBlock(Block at);
   void Report(const Figures& figures, int64_t points_done)
@@ -87,9 +87,9 @@ class Binder {
   Binding::Parts& parts_;
 
   const int64_t block_points_;
-  const Vec3 center_;                // Of the rig's bounding box.
-  Positions vertices_;               // Rig vertices relative to the centre.
-  Positions normals_;                // Rest normals, one per normal column.
+  const Vec3 center_;  // Of the rig's bounding box.
+  const double diagonal_;
+  Positions rest_;  // C x 3: rig vertices relative to the centre, rest normals.
   std::vector<PointState> states_;   // N
   std::vector<int32_t> exit_faces_;  // N, -1 for none.
   std::vector<UnboundPoints> unassigned_;
@@ -106,14 +106,16 @@ Binder::Binder(const BindRequest& request, const BindControl& control,
       parts_(parts),
       block_points_(BlockPoints(parts.weights.columns())),
       center_(BoxOf(RestVertices(parts.rig)).center()),
-      vertices_(RestVertices(parts.rig).rowwise() - center_.transpose()),
+      diagonal_(DiagonalOf(parts.rig)),
+      rest_(parts.weights.columns(), 3),
       states_(parts.model->size()),
       exit_faces_(parts.model->size(), -1) {
-  if (parts.weights.columns() == vertices_.rows()) return;
+  const Positions& vertices = RestVertices(parts.rig);
+  rest_.topRows(vertices.rows()) = vertices.rowwise() - center_.transpose();
+  if (rest_.rows() == vertices.rows()) return;
   const CageFaces faces(std::get<Cage>(parts.rig));
-  normals_.resize(faces.size(), 3);
   for (int64_t f = 0; f < faces.size(); ++f) {
-    normals_.row(f) = faces[f].normal;
+    rest_.row(vertices.rows() + f) = faces[f].normal;
   }
 }
 
@@ -132,49 +134,55 @@ bool Binder::ForEach(int64_t count,
   return true;
 }
 
-void Binder::Store(int64_t point, Row vertex, Row normal, Figures& figures) {
-  const double largest =
-      std::max(vertex.cwiseAbs().maxCoeff(),
-               normal.size() == 0 ? 0.0 : normal.cwiseAbs().maxCoeff());
-  if (!(largest <= std::numeric_limits<float>::max())) {
-    figures.too_large.push_back(point);
-    return;
+void Binder::Measure(Block at, absl::FunctionRef<bool(int64_t)> wanted,
+                     Figures& figures) {
+  const int64_t vertices = RestVertices(parts_.rig).rows();
+  TileMeasures measures;
+  int64_t measured = -1;  // Tile.
+  for (int64_t i = at.first; i < at.first + at.count; ++i) {
+    if (!wanted(i)) continue;
+    const int64_t tile = i / kTilePoints, lane = i % kTilePoints;
+    if (tile != measured) {
+      MeasureTile(parts_.weights.tile(tile), rest_.rows(), vertices,
+                  rest_.data(), measures);
+      measured = tile;
+    }
+    if (!std::isfinite(measures.vertex_sum[lane] + measures.normal_sum[lane])) {
+      figures.too_large.push_back(i);
+      parts_.weights.Clear(i);
+      continue;
+    }
+    const Vec3 x(measures.position[0][lane], measures.position[1][lane],
+                 measures.position[2][lane]);
+    // Positions count from the middle of the rig: how coarse doubles are far
+    // from the origin is not the weights' doing.
+    const Vec3 eta = points().row(i).transpose() - center_;
+    figures.reproduction_error =
+        std::max(figures.reproduction_error, ((x - eta) / diagonal_).norm());
+    figures.weight_sum_max =
+        std::max(figures.weight_sum_max, measures.vertex_sum[lane]);
   }
-  for (int64_t k = 0; k < vertex.size(); ++k) {
-    parts_.weights.set(point, k, static_cast<float>(vertex[k]));
-  }
-  for (int64_t j = 0; j < normal.size(); ++j) {
-    parts_.weights.set(point, vertex.size() + j, static_cast<float>(normal[j]));
-  }
-  // Positions count from the middle of the rig: how coarse doubles are far from
-  // the origin is not the weights' doing.
-  Eigen::RowVector3d x = vertex * vertices_;
-  if (normal.size() > 0) x += normal * normals_;
-  const Eigen::RowVector3d eta = points().row(point) - center_.transpose();
-  figures.reproduction_error = std::max(
-      figures.reproduction_error, (x - eta).norm() / DiagonalOf(parts_.rig));
-  figures.weight_sum_max =
-      std::max(figures.weight_sum_max, vertex.cwiseAbs().sum());
 }
 
 void Binder::EvaluateBlock(Block at) {
-  WeightBlock block;
-  evaluator_.Evaluate(points().middleRows(at.first, at.count), block);
+  TileBlock block{.tiles = parts_.weights.tile(at.first / kTilePoints)};
+  evaluator_.EvaluateTiles(points().middleRows(at.first, at.count), block);
+  std::copy(block.states.begin(), block.states.end(),
+            states_.begin() + at.first);
   Figures figures;
-  int64_t done = 0;
-  for (int64_t i = 0; i < at.count; ++i) {
-    const PointState state = block.states[i];
-    states_[at.first + i] = state;
-    done += state != PointState::kOutside;  // Those wait for their exit face.
-    if (!IsBound(state)) continue;
-    Store(at.first + i, block.vertex.row(i), block.normal.row(i), figures);
-    if (block.iterations.empty()) continue;
+  const auto bound = [&](int64_t i) { return IsBound(states_[i]); };
+  Measure(at, bound, figures);
+  for (int64_t i = 0; i < std::ssize(block.iterations); ++i) {
+    if (!bound(at.first + i)) continue;
     figures.iterations_max =
         std::max<int>(figures.iterations_max, block.iterations[i]);
     figures.iterations += block.iterations[i];
     ++figures.iterated_points;
   }
-  Report(figures, done);
+  // Outside points wait for their exit face.
+  const int64_t waiting = std::count(block.states.begin(), block.states.end(),
+                                     PointState::kOutside);
+  Report(figures, at.count - waiting);
 }
 
 void Binder::Report(const Figures& figures, int64_t points_done) {
@@ -219,19 +227,23 @@ void Binder::AssignExits() {
 }
 
 void Binder::ExtendBlock(Block at) {
-  Figures figures;
   int64_t done = 0;
-  Eigen::RowVectorXd vertex(vertices_.rows()), normal(normals_.rows());
   for (int64_t i = at.first; i < at.first + at.count; ++i) {
-    done += states_[i] == PointState::kOutside;
-    if (exit_faces_[i] < 0) continue;
-    vertex.setZero();
-    normal.setZero();
-    evaluator_.Extend(points().row(i), exit_faces_[i],
-                      {vertex.data(), static_cast<size_t>(vertex.size())},
-                      {normal.data(), static_cast<size_t>(normal.size())});
-    Store(i, vertex, normal, figures);
+    if (states_[i] != PointState::kOutside) continue;
+    ++done;
+    if (exit_faces_[i] < 0) {
+      parts_.weights.Clear(i);
+      continue;
+    }
+    for (const WeightShare& share :
+         evaluator_.Extend(points().row(i), exit_faces_[i])) {
+      const double weight = parts_.weights.at(i, share.column);
+      parts_.weights.set(i, share.column, RoundedWeight(weight + share.weight));
+    }
   }
+  Figures figures;
+  Measure(
+      at, [&](int64_t i) { return exit_faces_[i] >= 0; }, figures);
   Report(figures, done);
 }
 

@@ -77,11 +77,12 @@ void Recomputation::Extend() {
         std::lower_bound(part.points.begin(), part.points.end(), range_.first);
     for (; point != part.points.end() && Contains(*point); ++point) {
       const int64_t row = *point - range_.first;
-      evaluator_.Extend(Point(*point), part.exit_face,
-                        {block_.vertex.row(row).data(),
-                         static_cast<size_t>(block_.vertex.cols())},
-                        {block_.normal.row(row).data(),
-                         static_cast<size_t>(block_.normal.cols())});
+      for (const WeightShare& share :
+           evaluator_.Extend(Point(*point), part.exit_face)) {
+        const int64_t normal = share.column - block_.vertex.cols();
+        (normal < 0 ? block_.vertex(row, share.column)
+                    : block_.normal(row, normal)) += share.weight;
+      }
     }
   }
 }

@@ -40,8 +40,9 @@ struct BindControl {
 
 // Figures of how a binding came out.
 struct BindQuality {
-  // Largest |sum phi v + sum psi n - eta| of the double weights, in units of D;
-  // positions count from the middle of the rig.
+  // Largest |sum phi v + sum psi n - eta|, in units of D, of the weights as
+  // they are cached: rounding to float alone makes about 1e-7 of it, times the
+  // sum of |weight|. Positions count from the middle of the rig.
   double reproduction_error = 0;
   // Largest sum of |vertex weight| of a point.
   double weight_sum_max = 0;
@@ -107,8 +108,8 @@ class Binding {
 absl::StatusOr<std::shared_ptr<const Binding>> Bind(const BindRequest& request,
                                                     const BindControl& control);
 
-// The weights of points [first, first + count) again, in double, as Bind()
-// computed them before they were rounded. Rows of unbound points are 0.
+// The weights of points [first, first + count) again, in double: what Bind()
+// cached, without the error of float. Rows of unbound points are 0.
 // InvalidArgument RANGE_OUT_OF_BOUNDS if there are no such points.
 absl::StatusOr<WeightBlock> RecomputeWeights(const Binding& binding,
                                              int64_t first, int64_t count);

@@ -8,6 +8,7 @@
 // builtin_schemes.cc. The property tests run over that list.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -26,8 +27,8 @@ enum class RigKind { kCage, kHandles };
 enum class PointState : uint8_t {
   kInside,
   kBoundary,
-  // Outside, and this scheme reaches it only through an exit face; its rows are
-  // 0 until WeightEvaluator::Extend.
+  // Outside, and this scheme reaches it only through an exit face; its vertex
+  // weights sum to 0 and are of no use until WeightEvaluator::Extend.
   kOutside,
   // Bound although outside: the scheme (mean value) needs no exit face.
   kBoundOutside,
@@ -43,12 +44,28 @@ enum class PointState : uint8_t {
 using RowMatrix =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// Weights of a block of points, in double: what an evaluator writes.
+// Weights of a block of points, in double.
 struct WeightBlock {
   RowMatrix vertex;  // n x V, no unit; every bound row sums to 1.
   RowMatrix normal;  // n x F, model units; n x 0 if normals are not used.
   std::vector<PointState> states;    // n
   std::vector<uint16_t> iterations;  // n for iterative schemes, else empty.
+};
+
+// Weights of a block of points as they are cached: float, in tiles.
+struct TileBlock {
+  // The caller's: columns x 16 for each tile, as WeightTiles has it, with V or
+  // V + F columns. Every weight is written; padding with 0, and what float
+  // cannot hold with infinity.
+  float* tiles = nullptr;
+  std::vector<PointState> states;    // n
+  std::vector<uint16_t> iterations;  // n for iterative schemes, else empty.
+};
+
+// To be added to a weight. Columns count the vertices, then the normals.
+struct WeightShare {
+  int64_t column = 0;
+  double weight = 0;
 };
 
 // A scheme prepared for one rig. Has no state that changes: one object serves
@@ -59,15 +76,22 @@ class WeightEvaluator {
 
   // Computes the weights of `points` (n x 3, model units), which should be
   // neighbours, into `block`, resized as needed. Points on a cage get the limit
-  // from inside. Rows of points that are not bound are 0. O(n (V + F)).
+  // from inside. Rows of points that are not bound are 0, but for those of
+  // outside points. O(n (V + F)).
   virtual void Evaluate(const PositionsRef& points,
                         WeightBlock& block) const = 0;
 
-  // Adds to the rows of an outside point its extension through `exit_face`.
-  // Only for schemes that report kOutside.
-  virtual void Extend(const Vec3& /*point*/, int64_t /*exit_face*/,
-                      std::span<double> /*vertex*/,
-                      std::span<double> /*normal*/) const {}
+  // The same to the precision of float, at the speed that allows: within 1e-6,
+  // normals times the size of the rig, beyond what the doubles lose.
+  virtual void EvaluateTiles(const PositionsRef& points,
+                             TileBlock& block) const;
+
+  // What is to be added to the row of an outside point so that it follows
+  // `exit_face`. Only for schemes that report kOutside.
+  virtual std::array<WeightShare, 4> Extend(const Vec3& /*point*/,
+                                            int64_t /*exit_face*/) const {
+    return {};
+  }
 };
 
 struct SchemeOptions {

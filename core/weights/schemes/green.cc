@@ -22,19 +22,21 @@ class GreenEvaluator : public WeightEvaluator {
  public:
   explicit GreenEvaluator(const Cage& cage)
       : faces_(cage),
+        vertices_(cage.vertex_count()),
         tolerance_(BoundaryTolerance(cage)),
         integrals_(cage.dimension() == 2 ? MakeGreen2d(cage)
                                          : MakeGreen3d(cage)) {}
 
   void Evaluate(const PositionsRef& points, WeightBlock& block) const override;
-  void Extend(const Vec3& point, int64_t exit_face, std::span<double> vertex,
-              std::span<double> normal) const override;
+  std::array<WeightShare, 4> Extend(const Vec3& point,
+                                    int64_t exit_face) const override;
 
  private:
   using Row = Eigen::Ref<Eigen::RowVectorXd>;
   PointState Close(const Vec3& eta, bool touches, Row phi) const;
 
   const CageFaces faces_;
+  const int64_t vertices_;
   const double tolerance_;
   const std::unique_ptr<const GreenIntegrals> integrals_;
 };
@@ -70,27 +72,24 @@ void GreenEvaluator::Evaluate(const PositionsRef& points,
   block.states.resize(points.rows());
   for (int64_t i = 0; i < points.rows(); ++i) {
     block.states[i] = Close(points.row(i), touches[i], block.vertex.row(i));
-    if (block.states[i] == PointState::kOutside ||
-        block.states[i] == PointState::kOverlap) {
+    if (block.states[i] == PointState::kOverlap) {
       block.vertex.row(i).setZero();
       block.normal.row(i).setZero();
     }
   }
 }
 
-void GreenEvaluator::Extend(const Vec3& point, int64_t exit_face,
-                            std::span<double> vertex,
-                            std::span<double> normal) const {
-  RowMatrix phi, psi;
-  std::vector<char> touches;
-  integrals_->Integrate(point.transpose(), phi, psi, touches);
-  Close(point, touches[0], phi.row(0));
+std::array<WeightShare, 4> GreenEvaluator::Extend(const Vec3& point,
+                                                  int64_t exit_face) const {
   const CageFaces::Face& face = faces_[exit_face];
   const Vec3 alpha = faces_.Barycentric(exit_face, point);
-  for (int k = 0; k < faces_.corners(); ++k) phi(face.corner[k]) += alpha[k];
-  psi(exit_face) += faces_.Height(exit_face, point);
-  for (size_t k = 0; k < vertex.size(); ++k) vertex[k] += phi(k);
-  for (size_t j = 0; j < normal.size(); ++j) normal[j] += psi(j);
+  const double beta = faces_.Height(exit_face, point);
+  std::array<WeightShare, 4> shares;
+  for (int k = 0; k < faces_.corners(); ++k) {
+    shares[k] = {face.corner[k], alpha[k]};
+  }
+  shares[3] = {vertices_ + exit_face, beta};
+  return shares;
 }
 
 class Green : public CoordinateScheme {

@@ -3,8 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <cstring>
 #include <memory>
 #include <string>
@@ -44,6 +46,9 @@ BindRequest RowOfPoints(int count) {
   return {.model = Shared(MeshOf(points)), .rig = Cube(), .scheme = "green"};
 }
 
+// What cached weights may be off by, in a cage of about this size.
+constexpr double kFloat = 1e-6;
+
 bool SameBits(const WeightTiles& a, const WeightTiles& b) {
   return a.bytes() == b.bytes() &&
          std::memcmp(a.tile(0), b.tile(0), a.bytes()) == 0;
@@ -56,8 +61,9 @@ TEST(Bind, ReproducesThePointsAtRest) {
   EXPECT_EQ((*binding)->vertex_count(), 8);
   EXPECT_EQ((*binding)->normal_count(), 12);
   EXPECT_EQ((*binding)->unbound_count(), 0);
-  // Double weights; the closed forms lose a few units in the last place.
-  EXPECT_LT((*binding)->quality().reproduction_error, 1e-14);
+  // Float weights: at most half a unit in the last place of each.
+  EXPECT_LT((*binding)->quality().reproduction_error, 1e-7);
+  EXPECT_GT((*binding)->quality().reproduction_error, 1e-10);
   EXPECT_GE((*binding)->quality().weight_sum_max, 1);
   EXPECT_GT((*binding)->compute_seconds(), 0);
 }
@@ -190,7 +196,8 @@ TEST(Bind, ExtendsOutsidePointsThroughTheirExitFaces) {
   EXPECT_EQ((*binding)->unbound_count(), 0);
   ASSERT_THAT((*binding)->exit_parts(), SizeIs(1));
   EXPECT_THAT((*binding)->exit_parts()[0].points, SizeIs(15));
-  EXPECT_LT((*binding)->quality().reproduction_error, 1e-14);
+  // Float weights, here of up to 5.
+  EXPECT_LT((*binding)->quality().reproduction_error, 1e-6);
 }
 
 TEST(Bind, WarnsWhereAPartCrossesSeveralFaces) {
@@ -344,7 +351,7 @@ TEST_P(BindEvery, SchemeGivesTheSameBitsOnAnyNumberOfThreads) {
   }
 }
 
-TEST_P(BindEvery, SchemeRecomputesWhatWasRounded) {
+TEST_P(BindEvery, SchemeRecomputesInDoubleWhatIsCachedInFloat) {
   const auto binding = Bind(Request(), {});
   ASSERT_TRUE(binding.ok()) << binding.status();
   const int64_t vertices = (*binding)->vertex_count();
@@ -360,8 +367,8 @@ TEST_P(BindEvery, SchemeRecomputesWhatWasRounded) {
     EXPECT_EQ(block->vertex, all->vertex.middleRows(first, count));
     for (int i = 0; i < count; ++i) {
       for (int k = 0; k < vertices; ++k) {
-        EXPECT_EQ((*binding)->weights().at(first + i, k),
-                  static_cast<float>(block->vertex(i, k)));
+        EXPECT_NEAR((*binding)->weights().at(first + i, k), block->vertex(i, k),
+                    kFloat);
       }
     }
   }
@@ -394,12 +401,14 @@ TEST_F(Recompute, GivesExtendedPointsTheirExitFaceAgain) {
     ASSERT_EQ(block->normal.rows(), count);
     for (int i = 0; i < count; ++i) {
       for (int k = 0; k < 8; ++k) {
-        EXPECT_EQ(binding->weights().at(first + i, k),
-                  static_cast<float>(block->vertex(i, k)));
+        const double weight = block->vertex(i, k);
+        EXPECT_NEAR(binding->weights().at(first + i, k), weight,
+                    kFloat * std::max(1.0, std::abs(weight)));
       }
       for (int j = 0; j < 12; ++j) {
-        EXPECT_EQ(binding->weights().at(first + i, 8 + j),
-                  static_cast<float>(block->normal(i, j)));
+        const double weight = block->normal(i, j);
+        EXPECT_NEAR(binding->weights().at(first + i, 8 + j), weight,
+                    kFloat * std::max(1.0, std::abs(weight)));
       }
     }
   }

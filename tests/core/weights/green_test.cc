@@ -113,10 +113,11 @@ TEST_P(GreenIn, FarOutsideEverythingStaysFinite) {
     WeightBlock block;
     evaluator->Evaluate(point, block);
     ASSERT_EQ(block.states[0], PointState::kOutside) << distance;
-    evaluator->Extend(
-        point.row(0), 0,
-        {block.vertex.data(), static_cast<size_t>(block.vertex.size())},
-        {block.normal.data(), static_cast<size_t>(block.normal.size())});
+    for (const WeightShare& share : evaluator->Extend(point.row(0), 0)) {
+      const int64_t normal = share.column - block.vertex.cols();
+      (normal < 0 ? block.vertex(0, share.column) : block.normal(0, normal)) +=
+          share.weight;
+    }
     EXPECT_TRUE(block.vertex.allFinite()) << distance;
     EXPECT_TRUE(block.normal.allFinite()) << distance;
     // Terms of the size of the distance cancel.

@@ -16,6 +16,7 @@
 
 #include "core/deform/affine_map.h"
 #include "core/deform/columns.h"
+#include "core/kernels/weight_tiles.h"
 #include "core/weights/scheme.h"
 #include "tests/support/shapes.h"
 
@@ -97,6 +98,16 @@ class SchemeProperty
     return pose;
   }
 
+  void Extend(const Vec3& point, int64_t exit_face, int64_t row,
+              WeightBlock& block) const {
+    const int64_t vertices = block.vertex.cols();
+    for (const WeightShare& share : evaluator_->Extend(point, exit_face)) {
+      (share.column < vertices ? block.vertex(row, share.column)
+                               : block.normal(row, share.column - vertices)) +=
+          share.weight;
+    }
+  }
+
   // [L08] Eq. 9 in displacement form; outside points leave through exit_face.
   Positions Deform(const Positions& points, const Pose& pose,
                    int64_t exit_face = -1) const {
@@ -108,11 +119,7 @@ class SchemeProperty
     Positions deformed = points;
     for (int64_t i = 0; i < points.rows(); ++i) {
       if (block.states[i] == PointState::kOutside) {
-        evaluator_->Extend(points.row(i), exit_face,
-                           {block.vertex.row(i).data(),
-                            static_cast<size_t>(block.vertex.cols())},
-                           {block.normal.row(i).data(),
-                            static_cast<size_t>(block.normal.cols())});
+        Extend(points.row(i), exit_face, i, block);
       }
       deformed.row(i) +=
           block.vertex.row(i) * columns.topRows(block.vertex.cols());
@@ -167,6 +174,31 @@ TEST_P(SchemeProperty, APointDoesNotDependOnItsNeighbours) {
   for (int64_t i = 0; i < points.rows(); ++i) {
     const WeightBlock alone = Evaluate(points.row(i));
     EXPECT_LT((alone.vertex.row(0) - together.vertex.row(i)).norm(), kDouble);
+  }
+}
+
+TEST_P(SchemeProperty, TilesHoldTheSameWeightsToThePrecisionOfFloat) {
+  for (const int n : {0, 1, 15, 16, 17, 40}) {
+    const Positions points = 1.2 * InnerPoints(n);  // Some are outside.
+    const WeightBlock doubles = Evaluate(points);
+    const int64_t vertices = doubles.vertex.cols();
+    const int64_t columns = vertices + doubles.normal.cols();
+    WeightTiles tiles(n, columns);
+    TileBlock block{.tiles = tiles.tile(0)};
+    std::fill(block.tiles, block.tiles + tiles.bytes() / sizeof(float), NAN);
+    evaluator_->EvaluateTiles(points, block);
+    EXPECT_EQ(block.states, doubles.states);
+    EXPECT_EQ(block.iterations.size(), doubles.iterations.size());
+    for (int64_t c = 0; c < columns; ++c) {
+      for (int64_t i = 0; i < tiles.tiles() * kTilePoints; ++i) {
+        const double expected = i >= n ? 0
+                                : c < vertices
+                                    ? doubles.vertex(i, c)
+                                    : doubles.normal(i, c - vertices);
+        ASSERT_NEAR(tiles.at(i, c), expected, i < n ? 1e-6 : 0)
+            << "point " << i << " of " << n << ", column " << c;
+      }
+    }
   }
 }
 
@@ -287,12 +319,22 @@ TEST_P(ExitProperty, OutsidePointsAreReproducedThroughAnyFace) {
   }
 }
 
-TEST_P(ExitProperty, RowsOfOutsidePointsAreZeroUntilExtended) {
+TEST_P(ExitProperty, RowsOfOutsidePointsVanishUntilExtended) {
   Positions outside(1, 3);
   outside << 3, 0, 0;
-  const WeightBlock block = Evaluate(outside);
-  EXPECT_EQ(block.vertex.norm(), 0);
-  EXPECT_EQ(block.normal.norm(), 0);
+  WeightBlock block = Evaluate(outside);
+  const Columns rest = PosedColumns(rig_, true).rest();
+  const auto x = [&]() -> Eigen::RowVector3d {
+    return block.vertex.row(0) * rest.topRows(block.vertex.cols()) +
+           block.normal.row(0) * rest.bottomRows(block.normal.cols());
+  };
+  // Without the extension all such points would lie in the origin ([L08]
+  // section 4.2).
+  EXPECT_NEAR(block.vertex.sum(), 0, kDouble);
+  EXPECT_LT(x().norm(), kDouble);
+  Extend(outside.row(0), 0, 0, block);
+  EXPECT_NEAR(block.vertex.sum(), 1, kDouble);
+  EXPECT_LT((x() - outside.row(0)).norm(), 10 * kDouble);
 }
 
 std::vector<const CoordinateScheme*> SchemesWithNormals() {

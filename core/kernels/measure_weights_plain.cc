@@ -1,0 +1,22 @@
+#include <cmath>
+
+#include "core/kernels/measure_weights.h"
+
+namespace deform {
+
+void MeasureTilePlain(const float* tile, int64_t columns, int64_t vertices,
+                      const double* column, TileMeasures& measures) {
+  measures = {};
+  for (int64_t c = 0; c < columns; ++c) {
+    for (int64_t i = 0; i < kTilePoints; ++i) {
+      const double weight = tile[c * kTilePoints + i];
+      for (int d = 0; d < 3; ++d) {
+        measures.position[d][i] += weight * column[3 * c + d];
+      }
+      double* sum = c < vertices ? measures.vertex_sum : measures.normal_sum;
+      sum[i] += std::abs(weight);
+    }
+  }
+}
+
+}  // namespace deform

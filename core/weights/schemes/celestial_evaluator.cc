@@ -2,36 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
-#include <new>
 #include <span>
 #include <utility>
 
+#include "core/base/aligned_array.h"
 #include "core/weights/schemes/celestial_lanes.h"
 
 namespace deform {
 namespace {
-
-// `count` doubles, aligned for any vector.
-class AlignedDoubles {
- public:
-  explicit AlignedDoubles(int64_t count)
-      : data_(static_cast<double*>(std::aligned_alloc(
-            64,
-            (static_cast<size_t>(count) * sizeof(double) + 63) / 64 * 64))) {
-    if (data_ == nullptr) throw std::bad_alloc();
-    std::fill(data_.get(), data_.get() + count, 0.0);
-  }
-  double* get() const { return data_.get(); }
-  double& operator[](int64_t i) const { return data_.get()[i]; }
-
- private:
-  struct Free {
-    void operator()(double* data) const { std::free(data); }
-  };
-  std::unique_ptr<double, Free> data_;
-};
 
 // The points of a block along a space-filling curve, so that each is near the
 // one before it, where its search starts.
@@ -99,10 +78,10 @@ class CelestialEvaluator final : public WeightEvaluator {
                      WeightBlock& block) const {
     const int64_t handles = handles_.rows();
     const int lanes = CelestialLanes();
-    const AlignedDoubles scratch(8 * lanes * handles);
-    const AlignedDoubles weights(lanes * handles);
-    const AlignedDoubles solution(3 * lanes);
-    const AlignedDoubles places(3 * lanes);
+    const AlignedArray<double> scratch(8 * lanes * handles);
+    const AlignedArray<double> weights(lanes * handles);
+    const AlignedArray<double> solution(3 * lanes);
+    const AlignedArray<double> places(3 * lanes);
     CelestialLaneJob job = {
         .handles = handles,
         .x = columns_.col(0).data(),

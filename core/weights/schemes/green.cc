@@ -9,36 +9,55 @@
 
 #include "core/weights/schemes/green.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
-#include <utility>
+#include <numeric>
 
 #include "core/base/error.h"
+#include "core/mesh/rig.h"
 #include "core/weights/cage_faces.h"
+#include "core/weights/schemes/green_lanes.h"
 
 namespace deform {
 namespace {
 
-class GreenEvaluator : public WeightEvaluator {
+class GreenEvaluator final : public LaneEvaluator {
  public:
-  explicit GreenEvaluator(const Cage& cage)
-      : faces_(cage),
+  GreenEvaluator(const Cage& cage, Way way)
+      : LaneEvaluator(cage.dimension() == 2 ? Way::kPlain : way,
+                      cage.vertex_count(), cage.face_count(),
+                      LaneScale(DiagonalOf(cage)), PointState::kOutside),
+        faces_(cage),
         vertices_(cage.vertex_count()),
         tolerance_(BoundaryTolerance(cage)),
         integrals_(cage.dimension() == 2 ? MakeGreen2d(cage)
-                                         : MakeGreen3d(cage)) {}
+                                         : MakeGreen3d(cage)),
+        lanes_(cage.dimension() == 2 ? nullptr : MakeGreen3dLanes(cage)) {}
 
-  void Evaluate(const PositionsRef& points, WeightBlock& block) const override;
   std::array<WeightShare, 4> Extend(const Vec3& point,
                                     int64_t exit_face) const override;
 
  private:
-  using Row = Eigen::Ref<Eigen::RowVectorXd>;
-  PointState Close(const Vec3& eta, bool touches, Row phi) const;
+  PointState EvaluatePoint(const Vec3& eta, std::span<double> phi,
+                           std::span<double> psi) const override;
+  void EvaluateLanes(LanePoints& points, void* scratch,
+                     double* weights) const override {
+    lanes_->Integrate(points, scratch, weights);
+  }
+  void EvaluateLanes(LanePoints& points, void* scratch,
+                     float* weights) const override {
+    lanes_->Integrate(points, scratch, weights);
+  }
+  int64_t ScratchBytes() const override { return lanes_->ScratchBytes(); }
+
+  PointState Close(const Vec3& eta, bool touches, std::span<double> phi) const;
 
   const CageFaces faces_;
   const int64_t vertices_;
   const double tolerance_;
   const std::unique_ptr<const GreenIntegrals> integrals_;
+  const std::unique_ptr<const GreenLanes> lanes_;
 };
 
 // Makes phi of eta sum to 1 inside and on the boundary, to 0 outside, by adding
@@ -46,8 +65,9 @@ class GreenEvaluator : public WeightEvaluator {
 // removes rounding: it comes from the solid angles of the faces close by, which
 // multiply the same barycentrics. On the boundary it is the step of the limit
 // from inside, at faces, edges and vertices alike.
-PointState GreenEvaluator::Close(const Vec3& eta, bool touches, Row phi) const {
-  const double winding = phi.sum();
+PointState GreenEvaluator::Close(const Vec3& eta, bool touches,
+                                 std::span<double> phi) const {
+  const double winding = std::accumulate(phi.begin(), phi.end(), 0.0);
   // Before the closure, which would hide it.
   if (!(winding > -0.5 && winding < 1.5)) return PointState::kOverlap;
   const bool inside = winding > 0.5;
@@ -64,19 +84,15 @@ PointState GreenEvaluator::Close(const Vec3& eta, bool touches, Row phi) const {
   return boundary ? PointState::kBoundary : state;
 }
 
-void GreenEvaluator::Evaluate(const PositionsRef& points,
-                              WeightBlock& block) const {
-  std::vector<char> touches;
-  integrals_->Integrate(points, block.vertex, block.normal, touches);
-  block.iterations.clear();
-  block.states.resize(points.rows());
-  for (int64_t i = 0; i < points.rows(); ++i) {
-    block.states[i] = Close(points.row(i), touches[i], block.vertex.row(i));
-    if (block.states[i] == PointState::kOverlap) {
-      block.vertex.row(i).setZero();
-      block.normal.row(i).setZero();
-    }
+PointState GreenEvaluator::EvaluatePoint(const Vec3& eta, std::span<double> phi,
+                                         std::span<double> psi) const {
+  const bool touches = integrals_->Integrate(eta, phi, psi);
+  const PointState state = Close(eta, touches, phi);
+  if (state == PointState::kOverlap) {
+    std::fill(phi.begin(), phi.end(), 0);
+    std::fill(psi.begin(), psi.end(), 0);
   }
+  return state;
 }
 
 std::array<WeightShare, 4> GreenEvaluator::Extend(const Vec3& point,
@@ -111,11 +127,16 @@ class Green : public CoordinateScheme {
       return InvalidInput("INVALID_OPTION", "options",
                           "Green coordinates take no options");
     }
-    return std::make_unique<GreenEvaluator>(*cage);
+    return MakeGreenEvaluator(*cage, Way::kLanes);
   }
 };
 
 }  // namespace
+
+std::unique_ptr<const WeightEvaluator> MakeGreenEvaluator(const Cage& cage,
+                                                          Way way) {
+  return std::make_unique<GreenEvaluator>(cage, way);
+}
 
 const CoordinateScheme& GreenScheme() {
   static const Green scheme;

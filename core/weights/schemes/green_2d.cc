@@ -9,6 +9,7 @@
 //   logarithm of a length, depends on the unit, as in the paper.
 // Cost: one atan2 and up to three logarithms per edge and point.
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -60,8 +61,8 @@ class Green2d : public GreenIntegrals {
         edges_(cage.faces()),
         tolerance_(BoundaryTolerance(cage)) {}
 
-  void Integrate(const PositionsRef& points, RowMatrix& phi, RowMatrix& psi,
-                 std::vector<char>& touches) const override;
+  bool Integrate(const Vec3& eta, std::span<double> phi,
+                 std::span<double> psi) const override;
 
  private:
   // Whether eta, with b1 and b2 relative to it, is about as close to an edge as
@@ -77,25 +78,23 @@ class Green2d : public GreenIntegrals {
   const double tolerance_;
 };
 
-void Green2d::Integrate(const PositionsRef& points, RowMatrix& phi,
-                        RowMatrix& psi, std::vector<char>& touches) const {
-  phi.setZero(points.rows(), vertices_.rows());
-  psi.resize(points.rows(), edges_.rows());
-  touches.assign(points.rows(), 0);
-  for (int64_t p = 0; p < points.rows(); ++p) {
-    for (int64_t e = 0; e < edges_.rows(); ++e) {
-      const int32_t i = edges_(e, 0), j = edges_(e, 1);
-      const Vec3 b1 = vertices_.row(i) - points.row(p);
-      const Vec3 b2 = vertices_.row(j) - points.row(p);
-      const Vec3 a = vertices_.row(j) - vertices_.row(i);
-      const double l = a.norm();
-      const Integral integral = IntegrateEdge(b1, b2, a, l);
-      phi(p, i) += integral.phi_i;
-      phi(p, j) += integral.phi_j;
-      psi(p, e) = integral.psi;
-      touches[p] |= Touches(b1, b2, a, l);
-    }
+bool Green2d::Integrate(const Vec3& eta, std::span<double> phi,
+                        std::span<double> psi) const {
+  std::fill(phi.begin(), phi.end(), 0);
+  bool touches = false;
+  for (int64_t e = 0; e < edges_.rows(); ++e) {
+    const int32_t i = edges_(e, 0), j = edges_(e, 1);
+    const Vec3 b1 = vertices_.row(i).transpose() - eta;
+    const Vec3 b2 = vertices_.row(j).transpose() - eta;
+    const Vec3 a = vertices_.row(j) - vertices_.row(i);
+    const double l = a.norm();
+    const Integral integral = IntegrateEdge(b1, b2, a, l);
+    phi[i] += integral.phi_i;
+    phi[j] += integral.phi_j;
+    psi[e] = integral.psi;
+    touches |= Touches(b1, b2, a, l);
   }
+  return touches;
 }
 
 }  // namespace

@@ -11,14 +11,15 @@
 //   a factor of their aspect ratio in phi.
 // Cost: one logarithm per edge and one atan2 per face and point.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <numbers>
-#include <utility>
+#include <vector>
 
 #include <Eigen/Geometry>
 
+#include "core/weights/cage_edges.h"
 #include "core/weights/cage_faces.h"
 #include "core/weights/schemes/green.h"
 
@@ -121,14 +122,14 @@ class Green3d : public GreenIntegrals {
  public:
   explicit Green3d(const Cage& cage);
 
-  void Integrate(const PositionsRef& points, RowMatrix& phi, RowMatrix& psi,
-                 std::vector<char>& touches) const override;
+  bool Integrate(const Vec3& eta, std::span<double> phi,
+                 std::span<double> psi) const override;
 
  private:
   void Look(const Vec3& eta, Sight& sight) const;
   // Adds the face's share to phi and returns psi.
   double IntegrateFace(const Face& face, const Sight& sight, double* phi,
-                       char& touches) const;
+                       bool& touches) const;
 
   const Positions vertices_;
   const double tolerance_;
@@ -138,7 +139,11 @@ class Green3d : public GreenIntegrals {
 
 Green3d::Green3d(const Cage& cage)
     : vertices_(cage.vertices()), tolerance_(BoundaryTolerance(cage)) {
-  std::map<std::pair<int32_t, int32_t>, int32_t> index;
+  const CageEdges edges(cage);
+  for (const auto& [from, to] : edges.edges) {
+    const Vec3 edge = vertices_.row(to) - vertices_.row(from);
+    edges_.push_back({from, to, edge.normalized(), edge.norm()});
+  }
   const CageFaces geometry(cage);
   faces_.resize(geometry.size());
   for (int64_t f = 0; f < geometry.size(); ++f) {
@@ -155,10 +160,7 @@ Green3d::Green3d(const Cage& cage)
       face.cosine[q] =
           geometry[f].m[(q + 1) % 3].dot(geometry[f].m[(q + 2) % 3]);
       face.area2 = geometry[f].height[q] * face.length[q];
-      const auto [at, is_new] = index.emplace(
-          std::minmax(from, to), static_cast<int32_t>(edges_.size()));
-      if (is_new) edges_.push_back({from, to, face.t[q], face.length[q]});
-      face.edge[q] = at->second;
+      face.edge[q] = edges.of_face[f][q];
     }
   }
 }
@@ -176,7 +178,7 @@ void Green3d::Look(const Vec3& eta, Sight& sight) const {
 }
 
 double Green3d::IntegrateFace(const Face& face, const Sight& sight, double* phi,
-                              char& touches) const {
+                              bool& touches) const {
   const Vec3* a[3];
   double r[3], L[3];
   for (int q = 0; q < 3; ++q) {
@@ -199,22 +201,19 @@ double Green3d::IntegrateFace(const Face& face, const Sight& sight, double* phi,
   return (d[0] * L[0] + d[1] * L[1] + d[2] * L[2] - h * omega) / (4 * pi);
 }
 
-void Green3d::Integrate(const PositionsRef& points, RowMatrix& phi,
-                        RowMatrix& psi, std::vector<char>& touches) const {
-  const int64_t n = points.rows();
-  phi.setZero(n, vertices_.rows());
-  psi.resize(n, static_cast<int64_t>(faces_.size()));
-  touches.assign(n, 0);
+bool Green3d::Integrate(const Vec3& eta, std::span<double> phi,
+                        std::span<double> psi) const {
   Sight sight;
   sight.a.resize(vertices_.rows());
   sight.r.resize(vertices_.rows());
   sight.L.resize(edges_.size());
-  for (int64_t i = 0; i < n; ++i) {
-    Look(points.row(i), sight);
-    for (size_t f = 0; f < faces_.size(); ++f) {
-      psi(i, f) = IntegrateFace(faces_[f], sight, &phi(i, 0), touches[i]);
-    }
+  Look(eta, sight);
+  std::fill(phi.begin(), phi.end(), 0);
+  bool touches = false;
+  for (size_t f = 0; f < faces_.size(); ++f) {
+    psi[f] = IntegrateFace(faces_[f], sight, phi.data(), touches);
   }
+  return touches;
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
 #include "core/mesh/closedness.h"
+#include "core/mesh/self_intersection.h"
 #include "core/mesh/triangle.h"
 #include "core/mesh/winding.h"
 
@@ -140,6 +141,14 @@ absl::Status Overlapping(absl::string_view what) {
   return InvalidInput("CAGE_OVERLAPPING", kCornersField, what);
 }
 
+absl::Status CheckCrossings(const Positions& vertices, const Faces& faces) {
+  const auto pair = FindSelfIntersection(vertices, faces);
+  if (!pair) return absl::OkStatus();
+  return Overlapping(absl::StrCat("faces ", pair->first, " and ", pair->second,
+                                  " cross each other: the cage runs through "
+                                  "itself"));
+}
+
 // Which side of the faces is inside. At the centroid of a face of a right cage
 // the other faces wind 1/2 times, behind it 1 and before it 0 times; around an
 // inside-out one -1/2 times. Anything else overlaps.
@@ -185,6 +194,7 @@ absl::StatusOr<Cage> Cage::Create(int dimension, Positions vertices,
   DEFORM_RETURN_IF_ERROR(CheckIndices(faces, vertices.rows(), kCornersField));
   DEFORM_RETURN_IF_ERROR(CheckFaces(vertices, faces));
   DEFORM_RETURN_IF_ERROR(CheckClosed(faces, vertices.rows(), kCornersField));
+  DEFORM_RETURN_IF_ERROR(CheckCrossings(vertices, faces));
   DEFORM_ASSIGN_OR_RETURN(const Side inside, FindInside(vertices, faces));
   if (inside == Side::kInsideOut) {
     if (orientation == Orientation::kAsGiven) {

@@ -24,8 +24,8 @@ class Cage {
   //   CAGE_NOT_MANIFOLD         an edge has three, or a vertex several fans
   //   CAGE_INCONSISTENT_ORIENTATION  neighbours disagree
   //   CAGE_INVERTED             inside out; kFlipIfInsideOut turns all faces
-  //   CAGE_OVERLAPPING          parts overlap or one of several is inverted: a
-  //                             face has not the inside on one side only
+  //   CAGE_OVERLAPPING          faces cross, parts overlap, or one is inverted:
+  //                             a face has not the inside on one side only
   static absl::StatusOr<Cage> Create(
       int dimension, Positions vertices, Faces faces,
       Orientation orientation = Orientation::kAsGiven);

@@ -45,6 +45,17 @@ void AddFace(Shape& shape, std::initializer_list<int32_t> corners) {
   std::copy(corners.begin(), corners.end(), shape.faces.row(f).data());
 }
 
+// Puts a vertex in place of the face, and three faces to it.
+void Split(Shape& shape, int64_t face, const Vec3& vertex) {
+  const auto added = static_cast<int32_t>(shape.positions.rows());
+  shape.positions.conservativeResize(added + 1, 3);
+  shape.positions.row(added) = vertex;
+  const Eigen::RowVector3i corners = shape.faces.row(face);
+  shape.faces(face, 2) = added;
+  AddFace(shape, {corners[1], corners[2], added});
+  AddFace(shape, {corners[2], corners[0], added});
+}
+
 struct BadCage {
   std::string name;
   std::function<void(Shape&)> spoil;
@@ -161,7 +172,15 @@ INSTANTIATE_TEST_SUITE_P(
          [](Shape& s) {
            s = Joined(s, Scaled(s, 1, {0.6, 0.1, 0.1}));
          },
-         "CAGE_OVERLAPPING", "parts of the cage overlap"},
+         "CAGE_OVERLAPPING", "cross each other: the cage runs through itself"},
+        // No centroid of a face tells.
+        {"DentThroughTheFloor",
+         [](Shape& s) {
+           int64_t f = 0;
+           while (s.positions.col(2)(s.faces.row(f)).sum() != 3) ++f;
+           Split(s, f, {0.9, 0.8, -0.1});
+         },
+         "CAGE_OVERLAPPING", "cross each other: the cage runs through itself"},
         {"CoincidentComponents", [](Shape& s) { s = Joined(s, s); },
          "CAGE_OVERLAPPING", "parts of the cage overlap"},
         {"Pillow",
@@ -210,7 +229,7 @@ INSTANTIATE_TEST_SUITE_P(
          "CAGE_OVERLAPPING", "the cage encloses no area"},
         {"FigureOfEight",
          [](Shape& s) { s.positions.row(2).swap(s.positions.row(3)); },
-         "CAGE_OVERLAPPING", "inwards"},
+         "CAGE_OVERLAPPING", "faces 1 and 3 cross each other"},
     }),
     NameOf);
 
@@ -263,12 +282,7 @@ TEST(Cage, MayHaveSliversAndNeedles) {
   const Vec3 a = box.positions.row(box.faces(0, 0));
   const Vec3 b = box.positions.row(box.faces(0, 1));
   const Vec3 c = box.positions.row(box.faces(0, 2));
-  box.positions.conservativeResize(9, 3);
-  box.positions.row(8) = (0.5 * (a + b) + 1e-9 * (c - b)).transpose();
-  const Eigen::RowVector3i face = box.faces.row(0);
-  box.faces(0, 2) = 8;
-  AddFace(box, {face[1], face[2], 8});
-  AddFace(box, {face[2], face[0], 8});
+  Split(box, 0, 0.5 * (a + b) + 1e-9 * (c - b));
   EXPECT_EQ(Create(box).status(), absl::OkStatus());
 }
 

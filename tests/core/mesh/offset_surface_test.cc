@@ -8,7 +8,6 @@
 
 #include "core/mesh/closedness.h"
 #include "core/mesh/distance_grid.h"
-#include "core/mesh/self_intersection.h"
 #include "core/mesh/topology.h"
 #include "core/mesh/triangle.h"
 #include "tests/support/shapes.h"
@@ -141,27 +140,6 @@ TEST(Decimate, MakesNoTriangleThatIsNotAllowed) {
                             coarse.positions.row(face[1]),
                             coarse.positions.row(face[2])));
   }
-}
-
-TEST(FindSelfIntersection, FindsFacesThatPierceEachOther) {
-  const Shape box = Cuboid({0, 0, 0}, {1, 1, 1});
-  EXPECT_FALSE(FindSelfIntersection(box.positions, box.faces));
-  const Shape apart = Joined(box, Scaled(box, 1, {1.5, 0, 0}));
-  EXPECT_FALSE(FindSelfIntersection(apart.positions, apart.faces));
-  const Shape nested = Joined(box, Scaled(box, 0.5));
-  EXPECT_FALSE(FindSelfIntersection(nested.positions, nested.faces));
-  const Shape crossing = Joined(box, Scaled(box, 1, {0.6, 0.3, 0.2}));
-  const auto pair = FindSelfIntersection(crossing.positions, crossing.faces);
-  ASSERT_TRUE(pair);
-  EXPECT_LT(pair->first, 12);
-  EXPECT_GE(pair->second, 12);
-}
-
-TEST(FindSelfIntersection, FindsASpikeThroughAFace) {
-  Shape sphere = Icosphere(1, 1);
-  EXPECT_FALSE(FindSelfIntersection(sphere.positions, sphere.faces));
-  sphere.positions.row(0) *= -2;
-  EXPECT_TRUE(FindSelfIntersection(sphere.positions, sphere.faces));
 }
 
 }  // namespace

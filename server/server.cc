@@ -52,7 +52,7 @@ struct Server::Parts {
                     .niceness = kBackgroundNiceness}),
         models(ModelLimits(options)),
         bindings(models, binds, BindingLimits(options)),
-        sessions(bindings.catalogue(),
+        sessions(bindings,
                  {.memory = options.max_sessions_memory.value,
                   .count = options.max_sessions},
                  EnvironmentOf(options, *compute)) {}

@@ -44,6 +44,20 @@ std::string TimeText(WallTime time) {
                           absl::UTCTimeZone());
 }
 
+std::string WeightStateText(WeightState state) {
+  switch (state) {
+    case WeightState::kResident:
+      return "resident";
+    case WeightState::kEvicted:
+      return "evicted";
+    case WeightState::kComputing:
+      return "computing";
+    case WeightState::kUnknown:
+      break;
+  }
+  return "unknown";
+}
+
 Json ToJson(const ModelInfo& model) {
   return {{"model_id", model.model_id},
           {"display_name", model.display_name},
@@ -76,6 +90,11 @@ Json ToJson(const BindingInfo& binding) {
           {"normal_count", binding.normal_count},
           {"rig_diagonal", binding.rig_diagonal},
           {"weight_bytes", binding.weight_bytes},
+          {"weight_state", WeightStateText(binding.weight_state)},
+          {"points_done", binding.points_done},
+          {"points_total", binding.points_total},
+          {"weight_users", binding.weight_users},
+          {"last_use_time", TimeText(binding.last_use_time)},
           {"compute_seconds", binding.compute_seconds},
           {"reproduction_error", binding.reproduction_error},
           {"weight_sum_max", binding.weight_sum_max},
@@ -131,6 +150,15 @@ void Describe(const BindingInfo& binding, std::ostream& out) {
   properties.Add("weights", absl::StrFormat("%s, computed in %s",
                                             Bytes(binding.weight_bytes),
                                             Seconds(binding.compute_seconds)));
+  std::string kept = WeightStateText(binding.weight_state);
+  if (binding.weight_state == WeightState::kComputing) {
+    absl::StrAppendFormat(&kept, ", %s of %s points",
+                          Thousands(binding.points_done),
+                          Thousands(binding.points_total));
+  }
+  properties.Add("kept", absl::StrFormat("%s; %d users, last use %s", kept,
+                                         binding.weight_users,
+                                         TimeText(binding.last_use_time)));
   properties.Add(
       "quality",
       absl::StrFormat("reproduces the model to %.2g of the "

@@ -20,5 +20,7 @@ void Describe(const SessionInfo& session, std::ostream& out);
 
 // "2026-01-31T12:00:00Z", in UTC.
 std::string TimeText(WallTime time);
+// "resident"
+std::string WeightStateText(WeightState state);
 
 }  // namespace deform::cli

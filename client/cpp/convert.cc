@@ -104,6 +104,19 @@ void ReadWeights(const v1::GetWeightsResponse& weights, WeightRows& out) {
   out.normal = rows.rightCols(weights.normal_count()).template cast<double>();
 }
 
+WeightState FromProto(v1::WeightState state) {
+  switch (state) {
+    case v1::WEIGHT_STATE_RESIDENT:
+      return WeightState::kResident;
+    case v1::WEIGHT_STATE_EVICTED:
+      return WeightState::kEvicted;
+    case v1::WEIGHT_STATE_COMPUTING:
+      return WeightState::kComputing;
+    default:
+      return WeightState::kUnknown;
+  }
+}
+
 }  // namespace
 
 ModelInfo FromProto(const v1::Model& model) {
@@ -128,6 +141,11 @@ BindingInfo FromProto(const v1::Binding& binding) {
       .normal_count = binding.normal_count(),
       .rig_diagonal = binding.rig_diagonal(),
       .weight_bytes = static_cast<int64_t>(binding.weight_bytes()),
+      .weight_state = FromProto(binding.weight_state()),
+      .points_done = static_cast<int64_t>(binding.progress().points_done()),
+      .points_total = static_cast<int64_t>(binding.progress().points_total()),
+      .weight_users = static_cast<int>(binding.weight_users()),
+      .last_use_time = FromProto(binding.last_use_time()),
       .compute_seconds = binding.compute_seconds(),
       .reproduction_error = binding.reproduction_error(),
       .weight_sum_max = binding.weight_sum_max(),

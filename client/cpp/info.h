@@ -39,6 +39,10 @@ struct ExitPartInfo {
   std::vector<int64_t> crossed_faces;
 };
 
+// Where the weights of a binding are; evicted ones are computed again when
+// somebody needs them.
+enum class WeightState { kUnknown, kResident, kEvicted, kComputing };
+
 struct BindingInfo {
   std::string binding_id;  // Content address.
   std::string model_id;
@@ -48,7 +52,13 @@ struct BindingInfo {
   int64_t vertex_count = 0;  // Rows of a pose.
   int64_t normal_count = 0;  // Weight columns of face normals.
   double rig_diagonal = 0;   // D, model units.
-  int64_t weight_bytes = 0;
+  int64_t weight_bytes = 0;  // Memory of the weights while they are resident.
+  WeightState weight_state = WeightState::kUnknown;
+  // Of kComputing.
+  int64_t points_done = 0;
+  int64_t points_total = 0;
+  int weight_users = 0;  // Sessions and calls; they keep the weights resident.
+  WallTime last_use_time;
   double compute_seconds = 0;
   double reproduction_error = 0;  // In units of D.
   double weight_sum_max = 0;

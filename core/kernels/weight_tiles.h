@@ -31,8 +31,10 @@ class WeightTiles {
   int64_t points() const { return points_; }
   int64_t columns() const { return columns_; }
   int64_t tiles() const { return (points_ + kTilePoints - 1) / kTilePoints; }
-  int64_t bytes() const {
-    return tiles() * columns_ * kTilePoints * int64_t{sizeof(float)};
+  int64_t bytes() const { return BytesFor(points_, columns_); }
+  static int64_t BytesFor(int64_t points, int64_t columns) {
+    return (points + kTilePoints - 1) / kTilePoints * kTilePoints * columns *
+           int64_t{sizeof(float)};
   }
 
   // columns x 16 floats.

@@ -58,7 +58,8 @@ struct Figures {
 class Binder {
  public:
   Binder(const BindRequest& request, const BindControl& control,
-         const WeightEvaluator& evaluator, Binding::Parts& parts);
+         const WeightEvaluator& evaluator, BindingFacts::Parts& parts,
+         WeightTiles& weights);
 
   // The steps, in order.
   absl::Status EvaluateAll();
@@ -68,7 +69,7 @@ class Binder {
   void Finish();
 
  private:
-  const Positions& points() const { return parts_.model->positions(); }
+  const Positions& points() const { return request_.model->positions(); }
   // False if cancelled.
   bool ForEach(int64_t count, absl::FunctionRef<void(int64_t)> body) const;
   // Measures the points of a block that `wanted` names.
@@ -84,7 +85,8 @@ class Binder {
   const BindRequest& request_;
   const BindControl& control_;
   const WeightEvaluator& evaluator_;
-  Binding::Parts& parts_;
+  BindingFacts::Parts& parts_;
+  WeightTiles& weights_;
 
   const int64_t block_points_;
   const Vec3 center_;  // Of the rig's bounding box.
@@ -99,21 +101,23 @@ class Binder {
 };
 
 Binder::Binder(const BindRequest& request, const BindControl& control,
-               const WeightEvaluator& evaluator, Binding::Parts& parts)
+               const WeightEvaluator& evaluator, BindingFacts::Parts& parts,
+               WeightTiles& weights)
     : request_(request),
       control_(control),
       evaluator_(evaluator),
       parts_(parts),
-      block_points_(BlockPoints(parts.weights.columns())),
-      center_(BoxOf(RestVertices(parts.rig)).center()),
-      diagonal_(DiagonalOf(parts.rig)),
-      rest_(parts.weights.columns(), 3),
-      states_(parts.model->size()),
-      exit_faces_(parts.model->size(), -1) {
-  const Positions& vertices = RestVertices(parts.rig);
+      weights_(weights),
+      block_points_(BlockPoints(weights.columns())),
+      center_(BoxOf(RestVertices(request.rig)).center()),
+      diagonal_(DiagonalOf(request.rig)),
+      rest_(weights.columns(), 3),
+      states_(request.model->size()),
+      exit_faces_(request.model->size(), -1) {
+  const Positions& vertices = RestVertices(request.rig);
   rest_.topRows(vertices.rows()) = vertices.rowwise() - center_.transpose();
   if (rest_.rows() == vertices.rows()) return;
-  const CageFaces faces(std::get<Cage>(parts.rig));
+  const CageFaces faces(std::get<Cage>(request.rig));
   for (int64_t f = 0; f < faces.size(); ++f) {
     rest_.row(vertices.rows() + f) = faces[f].normal;
   }
@@ -136,20 +140,20 @@ bool Binder::ForEach(int64_t count,
 
 void Binder::Measure(Block at, absl::FunctionRef<bool(int64_t)> wanted,
                      Figures& figures) {
-  const int64_t vertices = RestVertices(parts_.rig).rows();
+  const int64_t vertices = RestVertices(request_.rig).rows();
   TileMeasures measures;
   int64_t measured = -1;  // Tile.
   for (int64_t i = at.first; i < at.first + at.count; ++i) {
     if (!wanted(i)) continue;
     const int64_t tile = i / kTilePoints, lane = i % kTilePoints;
     if (tile != measured) {
-      MeasureTile(parts_.weights.tile(tile), rest_.rows(), vertices,
-                  rest_.data(), measures);
+      MeasureTile(weights_.tile(tile), rest_.rows(), vertices, rest_.data(),
+                  measures);
       measured = tile;
     }
     if (!std::isfinite(measures.vertex_sum[lane] + measures.normal_sum[lane])) {
       figures.too_large.push_back(i);
-      parts_.weights.Clear(i);
+      weights_.Clear(i);
       continue;
     }
     const Vec3 x(measures.position[0][lane], measures.position[1][lane],
@@ -165,7 +169,7 @@ void Binder::Measure(Block at, absl::FunctionRef<bool(int64_t)> wanted,
 }
 
 void Binder::EvaluateBlock(Block at) {
-  TileBlock block{.tiles = parts_.weights.tile(at.first / kTilePoints)};
+  TileBlock block{.tiles = weights_.tile(at.first / kTilePoints)};
   evaluator_.EvaluateTiles(points().middleRows(at.first, at.count), block);
   std::copy(block.states.begin(), block.states.end(),
             states_.begin() + at.first);
@@ -215,10 +219,10 @@ absl::Status Binder::CheckOverlap() const {
 }
 
 void Binder::AssignExits() {
-  const Cage* cage = std::get_if<Cage>(&parts_.rig);
+  const Cage* cage = std::get_if<Cage>(&request_.rig);
   if (cage == nullptr) return;
   ExitAssignment exits =
-      AssignExitFaces(*parts_.model, *cage, states_, request_.exits);
+      AssignExitFaces(*request_.model, *cage, states_, request_.exits);
   for (const ExitPart& part : exits.parts) {
     for (int64_t i : part.points) exit_faces_[i] = part.exit_face;
   }
@@ -232,13 +236,13 @@ void Binder::ExtendBlock(Block at) {
     if (states_[i] != PointState::kOutside) continue;
     ++done;
     if (exit_faces_[i] < 0) {
-      parts_.weights.Clear(i);
+      weights_.Clear(i);
       continue;
     }
     for (const WeightShare& share :
          evaluator_.Extend(points().row(i), exit_faces_[i])) {
-      const double weight = parts_.weights.at(i, share.column);
-      parts_.weights.set(i, share.column, RoundedWeight(weight + share.weight));
+      const double weight = weights_.at(i, share.column);
+      weights_.set(i, share.column, RoundedWeight(weight + share.weight));
     }
   }
   Figures figures;
@@ -312,7 +316,7 @@ std::vector<std::string> CoincidenceWarnings(const Positions& handles) {
 
 void Binder::Warn() {
   std::vector<std::string>& warnings = parts_.warnings;
-  if (const Handles* handles = std::get_if<Handles>(&parts_.rig)) {
+  if (const Handles* handles = std::get_if<Handles>(&request_.rig)) {
     warnings = CoincidenceWarnings(handles->positions());
   }
   for (const ExitPart& part : parts_.exit_parts) {
@@ -385,21 +389,19 @@ absl::StatusOr<std::shared_ptr<const Binding>> Bind(
   DEFORM_ASSIGN_OR_RETURN(const auto evaluator,
                           scheme->Prepare(request.rig, request.options));
   DEFORM_RETURN_IF_ERROR(CheckFits(request));
-  Binding::Parts parts{
-      .model = request.model,
-      .rig = request.rig,
-      .scheme = scheme,
-      .options = request.options,
-      .weights = WeightTiles(request.model->size(),
-                             Columns(request.rig, scheme->uses_normals()))};
-  Binder binder(request, control, *evaluator, parts);
+  const int64_t columns = Columns(request.rig, scheme->uses_normals());
+  BindingFacts::Parts parts{
+      .request = request, .scheme = scheme, .columns = columns};
+  auto weights = std::make_shared<WeightTiles>(request.model->size(), columns);
+  Binder binder(request, control, *evaluator, parts, *weights);
   DEFORM_RETURN_IF_ERROR(binder.EvaluateAll());
   DEFORM_RETURN_IF_ERROR(binder.CheckOverlap());
   binder.AssignExits();
   DEFORM_RETURN_IF_ERROR(binder.ExtendOutside());
   binder.Finish();
   parts.compute_seconds = SecondsSince(start);
-  return std::make_shared<const Binding>(std::move(parts));
+  return std::make_shared<const Binding>(BindingFacts(std::move(parts)),
+                                         std::move(weights));
 }
 
 }  // namespace deform

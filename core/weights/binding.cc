@@ -14,7 +14,7 @@ namespace {
 // Rows of some points of a binding.
 class Recomputation {
  public:
-  Recomputation(const Binding& binding, const WeightEvaluator& evaluator,
+  Recomputation(const BindingFacts& binding, const WeightEvaluator& evaluator,
                 Block range)
       : binding_(binding), evaluator_(evaluator), range_(range) {
     block_.vertex.resize(range.count, binding.vertex_count());
@@ -34,7 +34,7 @@ class Recomputation {
   }
   void Copy(const WeightBlock& from, Block at);
 
-  const Binding& binding_;
+  const BindingFacts& binding_;
   const WeightEvaluator& evaluator_;
   const Block range_;
   WeightBlock block_;
@@ -42,7 +42,7 @@ class Recomputation {
 
 void Recomputation::Evaluate() {
   const int64_t n = binding_.point_count();
-  const int64_t step = BlockPoints(binding_.weights().columns());
+  const int64_t step = BlockPoints(binding_.column_count());
   // Solvers start from a neighbour's solution: whole blocks give the same bits.
   const bool whole = binding_.scheme().rig_kind() == RigKind::kHandles;
   const int64_t end = range_.first + range_.count;
@@ -98,16 +98,36 @@ void Recomputation::ClearFixed() {
 
 }  // namespace
 
-Binding::Binding(Parts parts) : parts_(std::move(parts)) {
-  for (const UnboundPoints& group : parts_.unbound) {
-    fixed_points_.insert(fixed_points_.end(), group.points.begin(),
-                         group.points.end());
+BindingFacts::BindingFacts(Parts parts) {
+  auto state = std::make_shared<State>(State{std::move(parts), {}});
+  std::vector<int64_t>& fixed = state->fixed_points;
+  for (const UnboundPoints& group : state->unbound) {
+    fixed.insert(fixed.end(), group.points.begin(), group.points.end());
   }
-  std::sort(fixed_points_.begin(), fixed_points_.end());
-  unbound_count_ = static_cast<int64_t>(fixed_points_.size());
+  std::sort(fixed.begin(), fixed.end());
+  state_ = std::move(state);
 }
 
-absl::StatusOr<WeightBlock> RecomputeWeights(const Binding& binding,
+int64_t BindingFacts::bytes() const {
+  int64_t numbers = 3 * vertex_count();  // 8 bytes each.
+  int64_t indices = 0;                   // 4 bytes each.
+  if (const Cage* cage = std::get_if<Cage>(&rig())) {
+    indices += cage->faces().size();
+  }
+  const ExitRegions& exits = request().exits;
+  indices += static_cast<int64_t>(exits.faces.size());
+  indices += static_cast<int64_t>(exits.face_of_point.size());
+  numbers += static_cast<int64_t>(options().handle_weights.size());
+  for (const ExitPart& part : exit_parts()) {
+    numbers += static_cast<int64_t>(part.points.size());
+    indices += static_cast<int64_t>(part.crossed_faces.size());
+  }
+  // In their group, and among the fixed points.
+  numbers += 2 * unbound_count();
+  return numbers * int64_t{sizeof(double)} + indices * int64_t{sizeof(int32_t)};
+}
+
+absl::StatusOr<WeightBlock> RecomputeWeights(const BindingFacts& binding,
                                              int64_t first, int64_t count) {
   const int64_t n = binding.point_count();
   if (first < 0 || first > n || count < 0 || count > n - first) {

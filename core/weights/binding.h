@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/functional/function_ref.h"
@@ -51,51 +52,73 @@ struct BindQuality {
   double iterations_mean = 0;
 };
 
-// Immutable; travels as shared_ptr<const Binding>.
-class Binding {
+// What is known of a binding beside its weights: small, and enough to compute
+// them again. Immutable; copies share one state.
+class BindingFacts {
  public:
   // Everything below, as Bind() fills it in.
   struct Parts {
-    std::shared_ptr<const Mesh> model;
-    Rig rig;
+    BindRequest request;
     const CoordinateScheme* scheme = nullptr;
-    SchemeOptions options;
-    // N x C, C = V (+ F if the scheme uses normals); rows of unbound points 0.
-    WeightTiles weights;
+    int64_t columns = 0;  // C = V (+ F if the scheme uses normals).
     std::vector<ExitPart> exit_parts;
     std::vector<UnboundPoints> unbound;
     std::vector<std::string> warnings;
     BindQuality quality;
     double compute_seconds = 0;
   };
-  explicit Binding(Parts parts);
+  explicit BindingFacts(Parts parts);
 
-  const std::shared_ptr<const Mesh>& model() const { return parts_.model; }
-  const Rig& rig() const { return parts_.rig; }
-  const CoordinateScheme& scheme() const { return *parts_.scheme; }
-  const SchemeOptions& options() const { return parts_.options; }
-  const WeightTiles& weights() const { return parts_.weights; }
-  const std::vector<ExitPart>& exit_parts() const { return parts_.exit_parts; }
-  const std::vector<UnboundPoints>& unbound() const { return parts_.unbound; }
-  const std::vector<std::string>& warnings() const { return parts_.warnings; }
-  const BindQuality& quality() const { return parts_.quality; }
-  double compute_seconds() const { return parts_.compute_seconds; }
+  // Bind() computes the same weights from it again.
+  const BindRequest& request() const { return state_->request; }
+  const std::shared_ptr<const Mesh>& model() const { return request().model; }
+  const Rig& rig() const { return request().rig; }
+  const CoordinateScheme& scheme() const { return *state_->scheme; }
+  const SchemeOptions& options() const { return request().options; }
+  const std::vector<ExitPart>& exit_parts() const { return state_->exit_parts; }
+  const std::vector<UnboundPoints>& unbound() const { return state_->unbound; }
+  const std::vector<std::string>& warnings() const { return state_->warnings; }
+  const BindQuality& quality() const { return state_->quality; }
+  double compute_seconds() const { return state_->compute_seconds; }
 
-  int dimension() const { return parts_.model->dimension(); }
-  int64_t point_count() const { return parts_.model->size(); }
+  int dimension() const { return model()->dimension(); }
+  int64_t point_count() const { return model()->size(); }
   // Rows of a pose.
-  int64_t vertex_count() const { return RestVertices(parts_.rig).rows(); }
-  int64_t normal_count() const {
-    return parts_.weights.columns() - vertex_count();
+  int64_t vertex_count() const { return RestVertices(rig()).rows(); }
+  int64_t column_count() const { return state_->columns; }
+  int64_t normal_count() const { return column_count() - vertex_count(); }
+  int64_t unbound_count() const {
+    return static_cast<int64_t>(fixed_points().size());
   }
-  int64_t unbound_count() const { return unbound_count_; }
   // Points that stay at rest whatever the pose, sorted: those without weights.
-  const std::vector<int64_t>& fixed_points() const { return fixed_points_; }
+  const std::vector<int64_t>& fixed_points() const {
+    return state_->fixed_points;
+  }
+
+  // Memory of the above, without the model.
+  int64_t bytes() const;
 
  private:
-  Parts parts_;
-  int64_t unbound_count_;
-  std::vector<int64_t> fixed_points_;
+  struct State : Parts {
+    std::vector<int64_t> fixed_points;
+  };
+  std::shared_ptr<const State> state_;
+};
+
+// Facts and weights. Immutable; travels as shared_ptr<const Binding>.
+class Binding : public BindingFacts {
+ public:
+  // N x C; rows of unbound points are 0.
+  Binding(BindingFacts facts, std::shared_ptr<const WeightTiles> weights)
+      : BindingFacts(std::move(facts)), weights_(std::move(weights)) {}
+
+  const WeightTiles& weights() const { return *weights_; }
+  const std::shared_ptr<const WeightTiles>& shared_weights() const {
+    return weights_;
+  }
+
+ private:
+  std::shared_ptr<const WeightTiles> weights_;
 };
 
 // Computes the weights, tile by tile, on all threads of the pool. Errors:
@@ -111,7 +134,7 @@ absl::StatusOr<std::shared_ptr<const Binding>> Bind(const BindRequest& request,
 // The weights of points [first, first + count) again, in double: what Bind()
 // cached, without the error of float. Rows of unbound points are 0.
 // InvalidArgument RANGE_OUT_OF_BOUNDS if there are no such points.
-absl::StatusOr<WeightBlock> RecomputeWeights(const Binding& binding,
+absl::StatusOr<WeightBlock> RecomputeWeights(const BindingFacts& binding,
                                              int64_t first, int64_t count);
 
 }  // namespace deform

@@ -12,6 +12,9 @@
 namespace deform::server {
 namespace {
 
+// Between two looks at whether a caller still wants to wait.
+constexpr std::chrono::milliseconds kPollInterval{20};
+
 std::string BindingId(const BindSpec& spec) {
   ContentHash hash("binding");
   hash.Add(spec.tenant).Add(spec.model_id).Add(spec.scheme);
@@ -27,35 +30,50 @@ std::string BindingId(const BindSpec& spec) {
   return "b-" + hash.Finish();
 }
 
-// What a binding will hold: weights, the rig, and a list of points at worst.
-int64_t BytesOf(const Rig& rig, const CoordinateScheme& scheme,
-                int64_t points) {
+// What the weights of a binding will take.
+int64_t WeightBytes(const Rig& rig, const CoordinateScheme& scheme,
+                    int64_t points) {
   int64_t columns = RestVertices(rig).rows();
-  int64_t corners = 0;
-  if (const Cage* cage = std::get_if<Cage>(&rig)) {
-    corners = cage->faces().size();
-    if (scheme.uses_normals()) columns += cage->face_count();
-  }
-  const int64_t tiles = (points + kTilePoints - 1) / kTilePoints;
-  return tiles * kTilePoints * columns * int64_t{sizeof(float)} +
-         RestVertices(rig).size() * int64_t{sizeof(double)} +
-         corners * int64_t{sizeof(int32_t)} + points * int64_t{sizeof(int64_t)};
+  const Cage* cage = std::get_if<Cage>(&rig);
+  if (cage != nullptr && scheme.uses_normals()) columns += cage->face_count();
+  return WeightTiles::BytesFor(points, columns);
+}
+
+// What will be known beside them, at worst: the request, and all points twice
+// in lists.
+int64_t FactBytes(const BindRequest& request) {
+  const Cage* cage = std::get_if<Cage>(&request.rig);
+  const int64_t indices =
+      (cage != nullptr ? cage->faces().size() : 0) +
+      static_cast<int64_t>(request.exits.faces.size()) +
+      static_cast<int64_t>(request.exits.face_of_point.size());
+  return (RestVertices(request.rig).size() + 2 * request.model->size()) *
+             int64_t{sizeof(double)} +
+         indices * int64_t{sizeof(int32_t)};
 }
 
 }  // namespace
 
 // One computation, owned by whoever waits for it or runs it.
 struct BindingRegistry::Job {
-  Job(Key k, BindRequest r) : key(std::move(k)), request(std::move(r)) {}
+  Job(Key k, BindRequest r)
+      : key(std::move(k)),
+        request(std::make_shared<const BindRequest>(std::move(r))) {}
+  explicit Job(const std::shared_ptr<const BindingRecord>& record)
+      : key(record->tenant, record->id),
+        request(record, &record->facts.request()),
+        known(record) {}
 
   const Key key;
-  const BindRequest request;
+  const std::shared_ptr<const BindRequest> request;
+  // Whose weights are computed again; null for a new binding.
+  const std::shared_ptr<const BindingRecord> known;
   int64_t points_total = 0;
   std::atomic<int64_t> points_done{0};
   Cancellation cancellation;
   // Until Compute() takes them.
   MemoryBudget::Reservation memory;
-  ModelCatalogue::Lease model;
+  ModelCatalogue::Lease model;  // Of a new binding.
   // Guarded by the registry's mutex.
   int waiters = 0;
   std::optional<absl::StatusOr<CreatedBinding>> outcome;
@@ -67,7 +85,7 @@ BindingRegistry::BindingRegistry(ModelRegistry& models, ThreadPool& pool,
       bind_(std::move(bind)),
       models_(models),
       pool_(pool),
-      budget_(limits.memory, "max-bindings-memory"),
+      weights_(limits.memory, "max-bindings-memory"),
       bindings_("binding", limits.count, "max-bindings") {}
 
 BindingRegistry::~BindingRegistry() {
@@ -80,6 +98,18 @@ BindingRegistry::~BindingRegistry() {
 absl::StatusOr<std::unique_ptr<BindingRegistry::Waiter>>
 BindingRegistry::Create(BindSpec spec) {
   const Key key(spec.tenant, BindingId(spec));
+  return Join(key, [&]() -> absl::StatusOr<std::shared_ptr<Job>> {
+    auto found = bindings_.Find(key.first, key.second);
+    if (found.ok()) return MakeJobFor(*found);
+    return MakeJob(key, std::move(spec));
+  });
+}
+
+absl::StatusOr<std::unique_ptr<BindingRegistry::Waiter>> BindingRegistry::Join(
+    const Key& key,
+    absl::FunctionRef<absl::StatusOr<std::shared_ptr<Job>>()> make) {
+  // Two calls that ask the same meet here: the lock is held until the job of
+  // the first can be found by the second.
   MutexLock lock(mutex_);
   if (waiting_ >= limits_.waiting_calls) {
     return MakeError(
@@ -89,14 +119,12 @@ BindingRegistry::Create(BindSpec spec) {
                      "later"),
         {.reason = "TOO_MANY_BINDS", .field = "max-waiting-binds"});
   }
-  // Two calls that ask the same meet here: the lock is held until the job of
-  // the first can be found by the second.
   std::shared_ptr<Job> job;
   const auto shared = jobs_.find(key);
   if (shared != jobs_.end() && !shared->second->cancellation.cancelled()) {
     job = shared->second;
   } else {
-    DEFORM_ASSIGN_OR_RETURN(job, MakeJob(key, std::move(spec)));
+    DEFORM_ASSIGN_OR_RETURN(job, make());
     if (!job->outcome) {
       jobs_[key] = job;
       queue_.push_back(job);
@@ -110,35 +138,92 @@ BindingRegistry::Create(BindSpec spec) {
 
 absl::StatusOr<std::shared_ptr<BindingRegistry::Job>> BindingRegistry::MakeJob(
     const Key& key, BindSpec spec) {
-  BindRequest request{.model = nullptr,
-                      .rig = std::move(spec.rig),
-                      .scheme = std::move(spec.scheme),
-                      .options = std::move(spec.options),
-                      .exits = std::move(spec.exits),
-                      .unbindable = spec.unbindable};
-  if (auto found = bindings_.Find(key.first, key.second); found.ok()) {
-    auto job = std::make_shared<Job>(key, std::move(request));
-    job->points_done = (*found)->binding->point_count();
-    job->points_total = job->points_done;
-    job->outcome = CreatedBinding{*std::move(found), true};
-    return job;
-  }
   DEFORM_ASSIGN_OR_RETURN(const CoordinateScheme* scheme,
-                          FindScheme(request.scheme));
+                          FindScheme(spec.scheme));
   DEFORM_ASSIGN_OR_RETURN(
       auto model,
       models_.catalogue().Use(key.first, spec.model_id,
                               absl::StrCat("binding ", key.second)));
-  request.model = model.record()->mesh;
-  const int64_t points = request.model->size();
-  DEFORM_ASSIGN_OR_RETURN(auto memory,
-                          budget_.Reserve(BytesOf(request.rig, *scheme, points),
-                                          "the binding needs"));
-  auto job = std::make_shared<Job>(key, std::move(request));
-  job->points_total = points;
+  auto job =
+      std::make_shared<Job>(key, BindRequest{.model = model.record()->mesh,
+                                             .rig = std::move(spec.rig),
+                                             .scheme = std::move(spec.scheme),
+                                             .options = std::move(spec.options),
+                                             .exits = std::move(spec.exits),
+                                             .unbindable = spec.unbindable});
+  job->points_total = job->request->model->size();
   job->model = std::move(model);
-  job->memory = std::move(memory);
+  DEFORM_ASSIGN_OR_RETURN(
+      job->memory, budget().Reserve(WeightBytes(job->request->rig, *scheme,
+                                                job->points_total) +
+                                        FactBytes(*job->request),
+                                    "the binding needs"));
   return job;
+}
+
+absl::StatusOr<std::shared_ptr<BindingRegistry::Job>>
+BindingRegistry::MakeJobFor(const std::shared_ptr<const BindingRecord>& known) {
+  auto job = std::make_shared<Job>(known);
+  const BindingFacts& facts = known->facts;
+  job->points_total = facts.point_count();
+  if (auto binding = known->weights->Get()) {
+    job->points_done = job->points_total;
+    job->outcome = CreatedBinding{known, std::move(binding), true};
+    return job;
+  }
+  DEFORM_ASSIGN_OR_RETURN(
+      job->memory,
+      budget().Reserve(
+          WeightBytes(facts.rig(), facts.scheme(), facts.point_count()) +
+              FactBytes(facts.request()),
+          "the weights of the binding, evicted since nobody used them, need"));
+  return job;
+}
+
+absl::StatusOr<BindingInUse> BindingRegistry::Use(const std::string& tenant,
+                                                  const std::string& id,
+                                                  const std::string& user,
+                                                  KeepWaiting keep_waiting) {
+  BindingInUse use;
+  DEFORM_ASSIGN_OR_RETURN(use.lease, bindings_.Use(tenant, id, user));
+  DEFORM_ASSIGN_OR_RETURN(use.binding,
+                          WeightsOf(use.lease.record(), keep_waiting));
+  return use;
+}
+
+absl::StatusOr<std::shared_ptr<const Binding>> BindingRegistry::WeightsOf(
+    const std::shared_ptr<const BindingRecord>& record,
+    KeepWaiting keep_waiting) {
+  if (auto binding = record->weights->Get()) return binding;
+  DEFORM_ASSIGN_OR_RETURN(const auto waiter,
+                          Join(Key(record->tenant, record->id),
+                               [&] { return MakeJobFor(record); }));
+  for (;;) {
+    if (auto outcome = waiter->Wait(kPollInterval)) {
+      DEFORM_RETURN_IF_ERROR(outcome->status());
+      return (*outcome)->binding;
+    }
+    if (!keep_waiting()) return absl::CancelledError();
+  }
+}
+
+absl::Status BindingRegistry::Remove(const std::string& tenant,
+                                     const std::string& id) {
+  std::shared_ptr<const BindingRecord> removed;  // Outlives the lock.
+  MutexLock lock(mutex_);
+  DEFORM_ASSIGN_OR_RETURN(removed, bindings_.Remove(tenant, id));
+  // Who waits for weights of a binding that is gone still gets them; who
+  // creates it again gets a new one.
+  jobs_.erase(Key(tenant, id));
+  return absl::OkStatus();
+}
+
+std::optional<BindProgress> BindingRegistry::ProgressOf(
+    const BindingRecord& record) {
+  MutexLock lock(mutex_);
+  const auto job = jobs_.find(Key(record.tenant, record.id));
+  if (job == jobs_.end() || job->second->known == nullptr) return std::nullopt;
+  return BindProgress{job->second->points_done, job->second->points_total};
 }
 
 void BindingRegistry::StartJobs() {
@@ -155,9 +240,7 @@ void BindingRegistry::Run(std::shared_ptr<Job> job) {
   absl::StatusOr<CreatedBinding> outcome = Compute(*job);
   MutexLock lock(mutex_);
   job->outcome = std::move(outcome);
-  // Another may have taken the place of a cancelled job.
-  const auto found = jobs_.find(job->key);
-  if (found != jobs_.end() && found->second == job) jobs_.erase(found);
+  Forget(job);
   // The registry may go as soon as nothing runs, and a job holds parts of it.
   job.reset();
   --running_;
@@ -168,22 +251,38 @@ void BindingRegistry::Run(std::shared_ptr<Job> job) {
 absl::StatusOr<CreatedBinding> BindingRegistry::Compute(Job& job) try {
   // Whatever happens, a failed job gives the model and the memory back before
   // anyone learns of it.
-  auto record = std::make_shared<BindingRecord>();
-  record->model = std::move(job.model);
-  record->memory = std::move(job.memory);
+  auto model = std::move(job.model);
+  auto memory = std::move(job.memory);
   if (job.cancellation.cancelled()) return absl::CancelledError();
   DEFORM_ASSIGN_OR_RETURN(
-      record->binding, bind_(job.request, {.pool = &pool_,
-                                           .cancellation = &job.cancellation,
-                                           .points_done = &job.points_done}));
-  record->tenant = job.key.first;
-  record->id = job.key.second;
-  record->model_id = record->model.record()->id;
-  record->create_time = absl::Now();
+      const auto computed,
+      bind_(*job.request, {.pool = &pool_,
+                           .cancellation = &job.cancellation,
+                           .points_done = &job.points_done}));
+  auto weights = memory.Split(computed->weights().bytes());
+  if (job.known != nullptr) {
+    // The facts stay the record's: one copy, and figures that do not change.
+    auto binding = std::make_shared<const Binding>(job.known->facts,
+                                                   computed->shared_weights());
+    return CreatedBinding{
+        job.known,
+        job.known->weights->Put(std::move(binding), std::move(weights)), true};
+  }
+  DEFORM_RETURN_IF_ERROR(memory.Resize(computed->bytes(), "the binding needs"));
+  const auto record = std::make_shared<const BindingRecord>(
+      BindingRecord{.tenant = job.key.first,
+                    .id = job.key.second,
+                    .model_id = model.record()->id,
+                    .facts = *computed,
+                    .weights = weights_.MakeSlot(),
+                    .create_time = absl::Now(),
+                    .memory = std::move(memory),
+                    .model = std::move(model)});
+  auto binding = record->weights->Put(computed, std::move(weights));
   DEFORM_ASSIGN_OR_RETURN(
-      auto inserted,
-      bindings_.Insert(job.key.first, job.key.second, std::move(record)));
-  return CreatedBinding{std::move(inserted.first), inserted.second};
+      auto inserted, bindings_.Insert(job.key.first, job.key.second, record));
+  return CreatedBinding{std::move(inserted.first), std::move(binding),
+                        inserted.second};
 } catch (const std::bad_alloc&) {
   return MakeError(absl::StatusCode::kResourceExhausted,
                    "the machine has no memory left for the computation",
@@ -192,7 +291,13 @@ absl::StatusOr<CreatedBinding> BindingRegistry::Compute(Job& job) try {
 
 void BindingRegistry::Abandon(const std::shared_ptr<Job>& job) {
   job->cancellation.Cancel();
-  if (std::erase(queue_, job) > 0) jobs_.erase(job->key);
+  if (std::erase(queue_, job) > 0) Forget(job);
+}
+
+void BindingRegistry::Forget(const std::shared_ptr<Job>& job) {
+  // Another may have taken its place.
+  const auto found = jobs_.find(job->key);
+  if (found != jobs_.end() && found->second == job) jobs_.erase(found);
 }
 
 BindingRegistry::Waiter::~Waiter() {

@@ -1,4 +1,6 @@
-// Bindings: computed once for everyone who asks the same, then kept.
+// Bindings: computed once for everyone who asks the same, then kept. Their
+// weights may be dropped while nobody uses them, and are computed again when
+// somebody does.
 #pragma once
 
 #include <atomic>
@@ -11,6 +13,7 @@
 #include <optional>
 #include <string>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
@@ -21,6 +24,7 @@
 #include "server/models/catalogue.h"
 #include "server/models/memory_budget.h"
 #include "server/models/model_registry.h"
+#include "server/models/weights_cache.h"
 
 namespace deform::server {
 
@@ -39,10 +43,11 @@ struct BindingRecord {
   std::string tenant;
   std::string id;  // Content address of the whole BindSpec.
   std::string model_id;
-  std::shared_ptr<const Binding> binding;
+  BindingFacts facts;
+  std::shared_ptr<WeightsCache::Slot> weights;  // Where they are, if they are.
   absl::Time create_time;
-  MemoryBudget::Reservation memory;
-  ModelCatalogue::Lease model;  // The model stays while its binding does.
+  MemoryBudget::Reservation memory;  // Of the facts.
+  ModelCatalogue::Lease model;       // The model stays while its binding does.
 };
 
 using BindingCatalogue = Catalogue<const BindingRecord>;
@@ -52,10 +57,22 @@ struct BindProgress {
   int64_t points_total = 0;
 };
 
+// A binding whose weights are here, and stay while this lives.
 struct CreatedBinding {
   std::shared_ptr<const BindingRecord> record;
+  std::shared_ptr<const Binding> binding;
   bool existed = false;
 };
+
+// A binding that can be neither removed nor evicted while this lives.
+struct BindingInUse {
+  BindingCatalogue::Lease lease;
+  std::shared_ptr<const Binding> binding;
+};
+
+// Asked a few times a second by who waits for a computation; false: give up.
+using KeepWaiting = absl::FunctionRef<bool()>;
+inline bool WaitForever() { return true; }
 
 // Thread-safe.
 class BindingRegistry {
@@ -63,7 +80,7 @@ class BindingRegistry {
 
  public:
   struct Limits {
-    int64_t memory;  // Of all bindings.
+    int64_t memory;  // Of all bindings, those being computed included.
     int64_t count;
     int concurrent;     // Computations at a time; others wait their turn.
     int waiting_calls;  // Callers that wait for a computation at a time.
@@ -101,30 +118,57 @@ class BindingRegistry {
   // Cancels what is being computed and waits for it.
   ~BindingRegistry();
 
-  // Finds the binding, joins its computation, or queues one. NotFound
-  // MODEL_NOT_FOUND, UNKNOWN_SCHEME; ResourceExhausted MEMORY_LIMIT,
+  // Finds the binding and its weights, joins their computation, or queues one.
+  // NotFound MODEL_NOT_FOUND, UNKNOWN_SCHEME; ResourceExhausted MEMORY_LIMIT,
   // TOO_MANY_BINDS. What Bind() refuses is told by the waiter.
   absl::StatusOr<std::unique_ptr<Waiter>> Create(BindSpec spec);
 
-  MemoryBudget& budget() { return budget_; }
-  BindingCatalogue& catalogue() { return bindings_; }
+  // The binding for `user`, with its weights: waits for them if they were
+  // evicted. NotFound BINDING_NOT_FOUND, Cancelled, and what Create() and its
+  // waiter refuse.
+  absl::StatusOr<BindingInUse> Use(const std::string& tenant,
+                                   const std::string& id,
+                                   const std::string& user,
+                                   KeepWaiting keep_waiting = WaitForever);
+  // The same without keeping it from being removed.
+  absl::StatusOr<std::shared_ptr<const Binding>> WeightsOf(
+      const std::shared_ptr<const BindingRecord>& record,
+      KeepWaiting keep_waiting = WaitForever);
+
+  // NotFound; FailedPrecondition BINDING_IN_USE.
+  absl::Status Remove(const std::string& tenant, const std::string& id);
+
+  // Set while the weights of this binding are being computed again.
+  std::optional<BindProgress> ProgressOf(const BindingRecord& record);
+
+  MemoryBudget& budget() { return weights_.budget(); }
+  // To look things up; Use() and Remove() are here.
+  const BindingCatalogue& catalogue() const { return bindings_; }
 
  private:
   using Key = std::pair<std::string, std::string>;  // Tenant, binding id.
 
-  absl::StatusOr<std::shared_ptr<Job>> MakeJob(const Key& key, BindSpec spec)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // The job for `key` that is under way, or else what `make` returns.
+  absl::StatusOr<std::unique_ptr<Waiter>> Join(
+      const Key& key,
+      absl::FunctionRef<absl::StatusOr<std::shared_ptr<Job>>()> make);
+  // Nothing but an outcome if the weights are here.
+  absl::StatusOr<std::shared_ptr<Job>> MakeJobFor(
+      const std::shared_ptr<const BindingRecord>& known);
+  absl::StatusOr<std::shared_ptr<Job>> MakeJob(const Key& key, BindSpec spec);
   void StartJobs() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Abandon(const std::shared_ptr<Job>& job)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Run(std::shared_ptr<Job> job);
+  void Forget(const std::shared_ptr<Job>& job)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::StatusOr<CreatedBinding> Compute(Job& job);
 
   const Limits limits_;
   const BindFunction bind_;
   ModelRegistry& models_;
   ThreadPool& pool_;
-  MemoryBudget budget_;
+  WeightsCache weights_;
   BindingCatalogue bindings_;
 
   Mutex mutex_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <utility>
 
@@ -34,6 +35,12 @@ class MemoryBudget {
 
     int64_t bytes() const { return bytes_; }
 
+    // Holds `bytes` from now on: fewer always, more as Reserve() would. An
+    // empty one stays empty.
+    absl::Status Resize(int64_t bytes, absl::string_view what);
+    // A part of its own, at most all; this one holds the rest.
+    Reservation Split(int64_t bytes);
+
    private:
     friend class MemoryBudget;
     Reservation(MemoryBudget* budget, int64_t bytes)
@@ -43,9 +50,14 @@ class MemoryBudget {
     int64_t bytes_ = 0;
   };
 
+  // Makes reservations that nobody needs go, at least so many bytes; none if
+  // there are not that many. Returns how many there were. Called without a
+  // lock held.
+  using Reclaim = std::function<int64_t(int64_t missing)>;
+
   // `option` is the name of the setting that an operator would raise.
-  MemoryBudget(int64_t limit, absl::string_view option)
-      : limit_(limit), option_(option) {}
+  MemoryBudget(int64_t limit, absl::string_view option, Reclaim reclaim = {})
+      : limit_(limit), option_(option), reclaim_(std::move(reclaim)) {}
 
   // ResourceExhausted MEMORY_LIMIT with figures, about the field `option`.
   // `what` begins the message: "weights need 2 GiB; ...".
@@ -55,10 +67,14 @@ class MemoryBudget {
   int64_t used();
 
  private:
+  absl::Status Take(int64_t bytes, absl::string_view what);
+  // The bytes that are missing; 0: they were there and are taken.
+  int64_t TryTake(int64_t bytes);
   void Release(int64_t bytes);
 
   const int64_t limit_;
   const std::string option_;
+  const Reclaim reclaim_;
   Mutex mutex_;
   int64_t used_ ABSL_GUARDED_BY(mutex_) = 0;
 };

@@ -24,8 +24,7 @@ using BindingWriter = grpc::ServerWriter<v1::CreateBindingResponse>;
 
 bool WriteProgress(const BindProgress& progress, BindingWriter& writer) {
   v1::CreateBindingResponse message;
-  message.mutable_progress()->set_points_done(progress.points_done);
-  message.mutable_progress()->set_points_total(progress.points_total);
+  ToProto(progress, message.mutable_progress());
   return writer.Write(message);
 }
 
@@ -51,14 +50,10 @@ absl::StatusOr<CreatedBinding> Await(BindingRegistry::Waiter& waiter,
   }
 }
 
-// The rows of `range`. Computing them again takes the priority of `pool`.
-absl::StatusOr<v1::GetWeightsResponse> Rows(const Binding& binding,
-                                            const PointRange& range,
-                                            v1::WeightPrecision precision,
-                                            ThreadPool& pool) {
-  if (precision != v1::WEIGHT_PRECISION_RECOMPUTED_FLOAT64) {
-    return CachedRows(binding, range);
-  }
+// The rows of `range`, computed at the priority of `pool`.
+absl::StatusOr<v1::GetWeightsResponse> RowsAgain(const BindingFacts& binding,
+                                                 const PointRange& range,
+                                                 ThreadPool& pool) {
   std::packaged_task<absl::StatusOr<v1::GetWeightsResponse>()> task(
       [&] { return RecomputedRows(binding, range); });
   auto rows = task.get_future();
@@ -67,6 +62,15 @@ absl::StatusOr<v1::GetWeightsResponse> Rows(const Binding& binding,
 }
 
 }  // namespace
+
+void BindingService::Describe(const BindingRecord& record, Detail detail,
+                              v1::Binding* out) {
+  ToProto(record, detail, out);
+  const auto progress = bindings_.ProgressOf(record);
+  if (!progress) return;
+  out->set_weight_state(v1::WEIGHT_STATE_COMPUTING);
+  ToProto(*progress, out->mutable_progress());
+}
 
 grpc::Status BindingService::CreateBinding(
     grpc::ServerContext* context, const v1::CreateBindingRequest* request,
@@ -79,7 +83,7 @@ grpc::Status BindingService::CreateBinding(
     DEFORM_ASSIGN_OR_RETURN(const CreatedBinding created,
                             Await(*waiter, *context, watch, *writer));
     v1::CreateBindingResponse message;
-    ToProto(*created.record, Detail::kFull, message.mutable_binding());
+    Describe(*created.record, Detail::kFull, message.mutable_binding());
     message.mutable_binding()->set_existed(created.existed);
     writer->Write(message);
     return absl::OkStatus();
@@ -95,9 +99,9 @@ grpc::Status BindingService::GetBinding(grpc::ServerContext* context,
     DEFORM_ASSIGN_OR_RETURN(
         const auto record,
         bindings_.catalogue().Find(tenant, request->binding_id()));
-    ToProto(*record, Detail::kFull, response->mutable_binding());
+    Describe(*record, Detail::kFull, response->mutable_binding());
     if (request->with_rig()) {
-      ToProto(record->binding->rig(), response->mutable_rig());
+      ToProto(record->facts.rig(), response->mutable_rig());
     }
     return absl::OkStatus();
   });
@@ -118,7 +122,7 @@ grpc::Status BindingService::ListBindings(
                  record.model_id == request->model_id();
         });
     for (const auto& record : page.records) {
-      ToProto(*record, Detail::kSummary, response->add_bindings());
+      Describe(*record, Detail::kSummary, response->add_bindings());
     }
     response->set_next_page_token(page.next);
     return absl::OkStatus();
@@ -131,7 +135,7 @@ grpc::Status BindingService::DeleteBinding(
   return calls_.Run("DeleteBinding", *context, [&]() -> absl::Status {
     DEFORM_ASSIGN_OR_RETURN(const std::string tenant,
                             TenantOr(request->tenant()));
-    return bindings_.catalogue().Remove(tenant, request->binding_id()).status();
+    return bindings_.Remove(tenant, request->binding_id());
   });
 }
 
@@ -145,15 +149,27 @@ grpc::Status BindingService::GetWeights(
     DEFORM_ASSIGN_OR_RETURN(
         const auto record,
         bindings_.catalogue().Find(tenant, request->binding_id()));
-    const Binding& binding = *record->binding;
-    DEFORM_ASSIGN_OR_RETURN(PointRange left, WantedPoints(*request, binding));
-    const int64_t at_once = PointsPerMessage(binding, request->precision());
+    const auto is_wanted = [&] {
+      watch.Progressed();
+      return !context->IsCancelled();
+    };
+    const bool again =
+        request->precision() == v1::WEIGHT_PRECISION_RECOMPUTED_FLOAT64;
+    DEFORM_ASSIGN_OR_RETURN(PointRange left,
+                            WantedPoints(*request, record->facts));
+    std::shared_ptr<const Binding> cached;
+    if (!again) {
+      DEFORM_ASSIGN_OR_RETURN(cached, bindings_.WeightsOf(record, is_wanted));
+    }
+    const int64_t at_once =
+        PointsPerMessage(record->facts, request->precision());
     while (left.count > 0) {
-      if (context->IsCancelled()) return absl::CancelledError();
+      if (!is_wanted()) return absl::CancelledError();
       const PointRange block{left.first, std::min(at_once, left.count)};
-      DEFORM_ASSIGN_OR_RETURN(
-          const v1::GetWeightsResponse rows,
-          Rows(binding, block, request->precision(), background_));
+      DEFORM_ASSIGN_OR_RETURN(const v1::GetWeightsResponse rows,
+                              again
+                                  ? RowsAgain(record->facts, block, background_)
+                                  : CachedRows(*cached, block));
       watch.Progressed();
       if (!writer->Write(rows)) return absl::CancelledError();
       watch.Progressed();

@@ -5,6 +5,7 @@
 #include "deform/v1/binding.grpc.pb.h"
 #include "server/models/binding_registry.h"
 #include "server/rpc/calls.h"
+#include "server/rpc/convert.h"
 
 namespace deform::server {
 
@@ -35,6 +36,9 @@ class BindingService final : public v1::BindingService::Service {
                            v1::ListSchemesResponse* response) override;
 
  private:
+  // With where its weights are.
+  void Describe(const BindingRecord& record, Detail detail, v1::Binding* out);
+
   CallRunner& calls_;
   BindingRegistry& bindings_;
   ThreadPool& background_;

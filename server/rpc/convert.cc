@@ -267,7 +267,7 @@ void ToProto(const ModelRecord& record, v1::Model* model) {
 }
 
 void ToProto(const BindingRecord& record, Detail detail, v1::Binding* out) {
-  const Binding& binding = *record.binding;
+  const BindingFacts& binding = record.facts;
   out->set_tenant(record.tenant);
   out->set_binding_id(record.id);
   out->set_model_id(record.model_id);
@@ -277,7 +277,12 @@ void ToProto(const BindingRecord& record, Detail detail, v1::Binding* out) {
   out->set_vertex_count(binding.vertex_count());
   out->set_normal_count(binding.normal_count());
   out->set_rig_diagonal(DiagonalOf(binding.rig()));
-  out->set_weight_bytes(binding.weights().bytes());
+  const WeightsCache::Slot::State weights = record.weights->state();
+  out->set_weight_bytes(weights.bytes);
+  out->set_weight_state(weights.resident ? v1::WEIGHT_STATE_RESIDENT
+                                         : v1::WEIGHT_STATE_EVICTED);
+  out->set_weight_users(weights.users);
+  ToProto(weights.last_use, out->mutable_last_use_time());
   out->set_compute_seconds(binding.compute_seconds());
   out->set_reproduction_error(binding.quality().reproduction_error);
   out->set_weight_sum_max(binding.quality().weight_sum_max);
@@ -300,6 +305,11 @@ void ToProto(const BindingRecord& record, Detail detail, v1::Binding* out) {
   for (const std::string& warning : binding.warnings()) {
     out->add_warnings(warning);
   }
+}
+
+void ToProto(const BindProgress& progress, v1::BindingProgress* out) {
+  out->set_points_done(progress.points_done);
+  out->set_points_total(progress.points_total);
 }
 
 void ToProto(const Rig& rig, v1::Rig* out) {

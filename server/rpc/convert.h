@@ -47,6 +47,7 @@ void ToProto(const ModelRecord& record, v1::Model* model);
 // In full, or without the lists that grow with the model.
 enum class Detail { kFull, kSummary };
 void ToProto(const BindingRecord& record, Detail detail, v1::Binding* binding);
+void ToProto(const BindProgress& progress, v1::BindingProgress* out);
 void ToProto(const Rig& rig, v1::Rig* out);
 void ToProto(const SessionState& state, v1::Session* session);
 void ToProto(const CoordinateScheme& scheme, v1::Scheme* out);

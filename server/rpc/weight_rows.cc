@@ -12,7 +12,8 @@ namespace {
 
 constexpr int64_t kMessageBytes = int64_t{1} << 20;
 
-v1::GetWeightsResponse Header(const Binding& binding, const PointRange& range,
+v1::GetWeightsResponse Header(const BindingFacts& binding,
+                              const PointRange& range,
                               v1::WeightPrecision precision) {
   v1::GetWeightsResponse rows;
   rows.set_first_point(range.first);
@@ -31,7 +32,7 @@ void Append(const Number* numbers, int64_t count, std::string* bytes) {
 }  // namespace
 
 absl::StatusOr<PointRange> WantedPoints(const v1::GetWeightsRequest& request,
-                                        const Binding& binding) {
+                                        const BindingFacts& binding) {
   if (!v1::WeightPrecision_IsValid(request.precision())) {
     return InvalidInput(
         "UNKNOWN_VALUE", "precision",
@@ -55,13 +56,13 @@ absl::StatusOr<PointRange> WantedPoints(const v1::GetWeightsRequest& request,
   return PointRange{static_cast<int64_t>(first), static_cast<int64_t>(count)};
 }
 
-int64_t PointsPerMessage(const Binding& binding,
+int64_t PointsPerMessage(const BindingFacts& binding,
                          v1::WeightPrecision precision) {
   const int64_t number = precision == v1::WEIGHT_PRECISION_RECOMPUTED_FLOAT64
                              ? sizeof(double)
                              : sizeof(float);
-  return std::max<int64_t>(
-      1, kMessageBytes / (binding.weights().columns() * number));
+  return std::max<int64_t>(1,
+                           kMessageBytes / (binding.column_count() * number));
 }
 
 v1::GetWeightsResponse CachedRows(const Binding& binding,
@@ -76,8 +77,8 @@ v1::GetWeightsResponse CachedRows(const Binding& binding,
   return rows;
 }
 
-absl::StatusOr<v1::GetWeightsResponse> RecomputedRows(const Binding& binding,
-                                                      const PointRange& range) {
+absl::StatusOr<v1::GetWeightsResponse> RecomputedRows(
+    const BindingFacts& binding, const PointRange& range) {
   DEFORM_ASSIGN_OR_RETURN(const WeightBlock block,
                           RecomputeWeights(binding, range.first, range.count));
   auto rows = Header(binding, range, v1::WEIGHT_PRECISION_RECOMPUTED_FLOAT64);

@@ -18,15 +18,16 @@ struct PointRange {
 // The points that `request` asks for. InvalidArgument POINT_OUT_OF_RANGE,
 // UNKNOWN_VALUE (precision).
 absl::StatusOr<PointRange> WantedPoints(const v1::GetWeightsRequest& request,
-                                        const Binding& binding);
+                                        const BindingFacts& binding);
 
 // Points whose rows fit one message of 1 MiB; at least one.
-int64_t PointsPerMessage(const Binding& binding, v1::WeightPrecision precision);
+int64_t PointsPerMessage(const BindingFacts& binding,
+                         v1::WeightPrecision precision);
 
 // The rows of `range` as they are cached, or computed again.
 v1::GetWeightsResponse CachedRows(const Binding& binding,
                                   const PointRange& range);
-absl::StatusOr<v1::GetWeightsResponse> RecomputedRows(const Binding& binding,
-                                                      const PointRange& range);
+absl::StatusOr<v1::GetWeightsResponse> RecomputedRows(
+    const BindingFacts& binding, const PointRange& range);
 
 }  // namespace deform::server

@@ -17,31 +17,31 @@ constexpr double kOriginStep = 0.25;
 }  // namespace
 
 std::shared_ptr<Session> Session::Create(
-    std::string id, BindingCatalogue::Lease binding,
-    MemoryBudget::Reservation memory, const SessionEnvironment& environment) {
+    std::string id, BindingInUse binding, MemoryBudget::Reservation memory,
+    const SessionEnvironment& environment) {
   return std::shared_ptr<Session>(new Session(std::move(id), std::move(binding),
                                               std::move(memory), environment));
 }
 
-Session::Session(std::string id, BindingCatalogue::Lease binding,
+Session::Session(std::string id, BindingInUse binding,
                  MemoryBudget::Reservation memory,
                  const SessionEnvironment& environment)
     : id_(std::move(id)),
-      tenant_(binding.record()->tenant),
-      binding_id_(binding.record()->id),
+      tenant_(binding.lease.record()->tenant),
+      binding_id_(binding.lease.record()->id),
       create_time_(absl::Now()),
       environment_(environment),
       memory_(std::move(memory)),
-      deformer_(binding.record()->binding, environment.pool),
-      lease_(std::move(binding)),
+      deformer_(std::move(binding.binding), environment.pool),
+      lease_(std::move(binding.lease)),
       queue_(RestPose(deformer_.binding().rig())),
       pose_(RestPose(deformer_.binding().rig())) {
   info_.origin = BoxOf(pose_.vertices).center();
   info_.origin_number = 1;
 }
 
-int64_t Session::BytesFor(const Binding& binding) {
-  const int64_t columns = binding.weights().columns();
+int64_t Session::BytesFor(const BindingFacts& binding) {
+  const int64_t columns = binding.column_count();
   // Displacements of double, two frames of float, columns and a few poses.
   return binding.point_count() * 3 *
              int64_t{sizeof(double) + 2 * sizeof(float)} +
@@ -134,9 +134,8 @@ bool Session::CanStep() const {
 }
 
 bool Session::NeedsFrame() const {
-  return std::any_of(seats_.begin(), seats_.end(), [](const auto& seat) {
-    return seat.second.needs_frame;
-  });
+  return std::any_of(seats_.begin(), seats_.end(),
+                     [](const auto& seat) { return seat.second.needs_frame; });
 }
 
 void Session::Schedule() {

@@ -111,8 +111,7 @@ class Session : public std::enable_shared_from_this<Session> {
   static constexpr int64_t kMaxOwnSteps = 4;
 
   // Starts at the rest pose, revision 0.
-  static std::shared_ptr<Session> Create(std::string id,
-                                         BindingCatalogue::Lease binding,
+  static std::shared_ptr<Session> Create(std::string id, BindingInUse binding,
                                          MemoryBudget::Reservation memory,
                                          const SessionEnvironment& environment);
 
@@ -140,7 +139,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void Drain(const absl::Status& status);
 
   // Memory of a session of `binding`, roughly.
-  static int64_t BytesFor(const Binding& binding);
+  static int64_t BytesFor(const BindingFacts& binding);
 
  private:
   friend class Participant;
@@ -158,7 +157,7 @@ class Session : public std::enable_shared_from_this<Session> {
     std::optional<TimePoint> sending_since;
   };
 
-  Session(std::string id, BindingCatalogue::Lease binding,
+  Session(std::string id, BindingInUse binding,
           MemoryBudget::Reservation memory,
           const SessionEnvironment& environment);
 

@@ -35,7 +35,7 @@ SessionManager::~SessionManager() {
 
 absl::StatusOr<std::shared_ptr<Session>> SessionManager::Create(
     const std::string& tenant, const std::string& binding_id,
-    const std::string& wanted_id) {
+    const std::string& wanted_id, KeepWaiting keep_waiting) {
   std::string id = wanted_id;
   if (id.empty()) {
     DEFORM_ASSIGN_OR_RETURN(id, RandomId());
@@ -43,15 +43,17 @@ absl::StatusOr<std::shared_ptr<Session>> SessionManager::Create(
   DEFORM_RETURN_IF_ERROR(CheckName(id, "session_id"));
   auto session = sessions_.Find(tenant, id);
   if (!session.ok()) {
-    DEFORM_ASSIGN_OR_RETURN(
-        auto lease,
-        bindings_.Use(tenant, binding_id, absl::StrCat("session ", id)));
+    DEFORM_ASSIGN_OR_RETURN(const auto record,
+                            bindings_.catalogue().Find(tenant, binding_id));
     DEFORM_ASSIGN_OR_RETURN(
         auto memory,
-        budget_.Reserve(Session::BytesFor(*lease.record()->binding),
-                        "the session needs"));
-    auto made =
-        Session::Create(id, std::move(lease), std::move(memory), environment_);
+        budget_.Reserve(Session::BytesFor(record->facts), "the session needs"));
+    DEFORM_ASSIGN_OR_RETURN(
+        auto binding,
+        bindings_.Use(tenant, binding_id, absl::StrCat("session ", id),
+                      keep_waiting));
+    auto made = Session::Create(id, std::move(binding), std::move(memory),
+                                environment_);
     // Under the lock of Drain(): it then sees every session that was made.
     MutexLock lock(mutex_);
     if (draining_) return Draining();

@@ -24,7 +24,7 @@ class SessionManager {
   };
 
   // Bindings are borrowed; so is what the environment points to.
-  SessionManager(BindingCatalogue& bindings, const Limits& limits,
+  SessionManager(BindingRegistry& bindings, const Limits& limits,
                  SessionEnvironment environment)
       : environment_(std::move(environment)),
         bindings_(bindings),
@@ -34,12 +34,13 @@ class SessionManager {
   ~SessionManager();
 
   // `id` may be empty: one is made. The session that is there if it has the
-  // same binding, else AlreadyExists SESSION_EXISTS. NotFound
-  // BINDING_NOT_FOUND, InvalidArgument BAD_NAME, ResourceExhausted
-  // MEMORY_LIMIT, TOO_MANY_SESSIONS, Unavailable SERVER_DRAINING.
-  absl::StatusOr<std::shared_ptr<Session>> Create(const std::string& tenant,
-                                                  const std::string& binding_id,
-                                                  const std::string& id);
+  // same binding, else AlreadyExists SESSION_EXISTS. Waits for weights that
+  // were evicted. NotFound BINDING_NOT_FOUND, InvalidArgument BAD_NAME,
+  // ResourceExhausted MEMORY_LIMIT, TOO_MANY_SESSIONS, TOO_MANY_BINDS,
+  // Cancelled, Unavailable SERVER_DRAINING.
+  absl::StatusOr<std::shared_ptr<Session>> Create(
+      const std::string& tenant, const std::string& binding_id,
+      const std::string& id, KeepWaiting keep_waiting = WaitForever);
 
   // Ends its streams with NotFound SESSION_DELETED.
   absl::Status Delete(const std::string& tenant, const std::string& id);
@@ -53,7 +54,7 @@ class SessionManager {
 
  private:
   const SessionEnvironment environment_;
-  BindingCatalogue& bindings_;
+  BindingRegistry& bindings_;
   MemoryBudget budget_;
   SessionCatalogue sessions_;
   mutable Mutex mutex_;

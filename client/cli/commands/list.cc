@@ -59,15 +59,19 @@ absl::Status ListBindings(Client& client, const std::string& model,
                {"POINTS", kRight},
                {"COLUMNS", kRight},
                {"MEMORY", kRight},
+               {"KEPT"},
+               {"LAST USE"},
                {"NOT BOUND", kRight},
                {"CREATED"}});
   for (const BindingInfo& binding : bindings) {
     list.push_back(ToJson(binding));
-    table.Add({binding.binding_id, binding.model_id.substr(0, 12),
-               binding.scheme, Thousands(binding.point_count),
-               Thousands(binding.vertex_count + binding.normal_count),
-               Bytes(binding.weight_bytes), Thousands(binding.unbound_count),
-               TimeText(binding.create_time)});
+    table.Add(
+        {binding.binding_id, binding.model_id.substr(0, 12), binding.scheme,
+         Thousands(binding.point_count),
+         Thousands(binding.vertex_count + binding.normal_count),
+         Bytes(binding.weight_bytes), WeightStateText(binding.weight_state),
+         TimeText(binding.last_use_time), Thousands(binding.unbound_count),
+         TimeText(binding.create_time)});
   }
   Print(console, "bindings", list, table);
   return absl::OkStatus();

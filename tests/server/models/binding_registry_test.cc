@@ -192,7 +192,7 @@ TEST_F(BindingRegistryTest, LetsTheModelGoWithItsBinding) {
   bind_.Permit(1);
   const std::string id =
       (*bindings_->Create(Spec()).value()->Wait(kLong).value()).record->id;
-  ASSERT_TRUE(bindings_->catalogue().Remove("t", id).ok());
+  ASSERT_TRUE(bindings_->Remove("t", id).ok());
   EXPECT_TRUE(models_.catalogue().Remove("t", model_id_).ok());
   EXPECT_EQ(bindings_->budget().used(), 0);
 }
@@ -217,8 +217,7 @@ TEST_F(BindingRegistryTest, RefusesWeightsBeyondTheMemoryLimit) {
 TEST_F(BindingRegistryTest, ReservesWhatTheWeightsTake) {
   bind_.Permit(1);
   const auto created = *bindings_->Create(Spec()).value()->Wait(kLong).value();
-  EXPECT_GE(bindings_->budget().used(),
-            created.record->binding->weights().bytes());
+  EXPECT_GE(bindings_->budget().used(), created.binding->weights().bytes());
 }
 
 TEST_F(BindingRegistryTest, NamesUnknownModelsAndSchemes) {
@@ -244,6 +243,182 @@ TEST_F(BindingRegistryTest, TellsHowFarItIs) {
   bind_.Permit(1);
   ASSERT_TRUE(waiter->Wait(kLong).value().ok());
   EXPECT_EQ(waiter->progress().points_done, 42);
+}
+
+// A registry whose memory holds the weights of two bindings, and what is known
+// of many.
+class EvictionTest : public BindingRegistryTest {
+ protected:
+  // 42 points in 3 tiles of 16, 8 vertices and 12 normals.
+  static constexpr int64_t kWeightBytes = 48 * 20 * 4;
+
+  EvictionTest() {
+    Restart({.memory = 3 * kWeightBytes,
+             .count = 10,
+             .concurrent = 2,
+             .waiting_calls = 4});
+    bind_.Permit(2);
+    a_ = Created(2);
+    b_ = Created(3);
+  }
+  ~EvictionTest() override {
+    bind_.Permit(10);
+    a_ = {};
+    b_ = {};
+  }
+
+  CreatedBinding Created(double cage_size) {
+    return *bindings_->Create(Spec(cage_size)).value()->Wait(kLong).value();
+  }
+  static bool IsResident(const CreatedBinding& created) {
+    return created.record->weights->state().resident;
+  }
+  static void LetGo(CreatedBinding& created) { created.binding = nullptr; }
+
+  CreatedBinding a_;
+  CreatedBinding b_;
+};
+
+TEST_F(EvictionTest, MakesRoomByDroppingWhatWasUnusedForLongest) {
+  LetGo(b_);
+  LetGo(a_);
+  bind_.Permit(1);
+  ASSERT_TRUE(bindings_->Create(Spec(4)).value()->Wait(kLong).value().ok());
+  EXPECT_TRUE(IsResident(a_));
+  EXPECT_FALSE(IsResident(b_));
+}
+
+TEST_F(EvictionTest, KeepsWhatIsInUse) {
+  LetGo(b_);
+  const auto user = bindings_->Use("t", b_.record->id, "session s");
+  ASSERT_TRUE(user.ok());
+  LetGo(a_);
+  bind_.Permit(1);
+  const auto c = *bindings_->Create(Spec(4)).value()->Wait(kLong).value();
+  EXPECT_FALSE(IsResident(a_));
+  EXPECT_TRUE(IsResident(b_));
+}
+
+TEST_F(EvictionTest, RefusesWithFiguresWhatDoesNotFitBesideWhatIsInUse) {
+  LetGo(a_);
+  const absl::Status refused =
+      bindings_->budget()
+          .Reserve(2 * kWeightBytes, "the binding needs")
+          .status();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+  // The weights of b and what is known of both: 336 bytes each.
+  EXPECT_EQ(
+      refused.message(),
+      "the binding needs 7.5 KiB; 4.406 KiB of 11.25 KiB "
+      "(max-bindings-memory) are in use: delete what is no longer needed");
+  EXPECT_EQ(DetailOf(refused).reason, "MEMORY_LIMIT");
+  EXPECT_EQ(DetailOf(refused).field, "max-bindings-memory");
+  EXPECT_TRUE(IsResident(a_)) << "nothing is dropped in vain";
+}
+
+TEST_F(EvictionTest, NeverGoesOverTheLimitWhileComputing) {
+  LetGo(a_);
+  LetGo(b_);
+  const auto c = bindings_->Create(Spec(4)).value();
+  const auto d = bindings_->Create(Spec(5)).value();
+  bind_.AwaitBegun(4);
+  EXPECT_LE(bindings_->budget().used(), bindings_->budget().limit());
+  EXPECT_FALSE(IsResident(a_));
+  EXPECT_FALSE(IsResident(b_));
+  EXPECT_EQ(DetailOf(bindings_->Create(Spec(6)).status()).reason,
+            "MEMORY_LIMIT");
+}
+
+TEST_F(EvictionTest, KnowsAllButTheWeightsOfAnEvictedBinding) {
+  LetGo(a_);
+  ASSERT_TRUE(bindings_->budget().Reserve(kWeightBytes, "others need").ok());
+  const auto found = bindings_->catalogue().Find("t", a_.record->id).value();
+  EXPECT_FALSE(IsResident(a_));
+  EXPECT_EQ(found->weights->state().bytes, kWeightBytes);
+  EXPECT_EQ(found->facts.point_count(), 42);
+  EXPECT_EQ(found->facts.normal_count(), 12);
+  EXPECT_LT(found->facts.quality().reproduction_error, 1e-14);
+  EXPECT_EQ(
+      DetailOf(models_.catalogue().Remove("t", model_id_).status()).reason,
+      "MODEL_IN_USE");
+}
+
+TEST_F(EvictionTest, ComputesEvictedWeightsAgainToTheSameBits) {
+  const WeightTiles& weights = a_.binding->weights();
+  const std::vector<float> before(weights.tile(0),
+                                  weights.tile(0) + kWeightBytes / 4);
+  const double seconds = a_.record->facts.compute_seconds();
+  LetGo(a_);
+  ASSERT_TRUE(bindings_->budget().Reserve(kWeightBytes, "others need").ok());
+  bind_.Permit(1);
+  const auto again = bindings_->Use("t", a_.record->id, "session s").value();
+  const float* after = again.binding->weights().tile(0);
+  EXPECT_EQ(std::vector<float>(after, after + kWeightBytes / 4), before);
+  EXPECT_EQ(again.lease.record(), a_.record);
+  EXPECT_EQ(again.binding->compute_seconds(), seconds);
+  EXPECT_TRUE(IsResident(a_));
+}
+
+TEST_F(EvictionTest, CreatingABindingBringsItsWeightsBack) {
+  LetGo(a_);
+  ASSERT_TRUE(bindings_->budget().Reserve(kWeightBytes, "others need").ok());
+  bind_.Permit(1);
+  const CreatedBinding again = Created(2);
+  EXPECT_TRUE(again.existed);
+  EXPECT_EQ(again.record, a_.record);
+  EXPECT_TRUE(IsResident(a_));
+}
+
+TEST_F(EvictionTest, ThoseWhoNeedTheSameWeightsShareTheirComputation) {
+  LetGo(a_);
+  ASSERT_TRUE(bindings_->budget().Reserve(kWeightBytes, "others need").ok());
+  const auto first = bindings_->Create(Spec(2)).value();
+  absl::StatusOr<BindingInUse> second;
+  std::thread other(
+      [&] { second = bindings_->Use("t", a_.record->id, "session s"); });
+  bind_.AwaitBegun(3);
+  EXPECT_EQ(bindings_->ProgressOf(*a_.record)->points_total, 42);
+  bind_.Permit(1);
+  other.join();
+  const auto created = *first->Wait(kLong).value();
+  EXPECT_EQ(created.binding->weights().tile(0),
+            second->binding->weights().tile(0));
+  EXPECT_EQ(bind_.begun(), 3);
+  EXPECT_FALSE(bindings_->ProgressOf(*a_.record).has_value());
+}
+
+TEST_F(EvictionTest, StopsComputingAgainWhenNobodyWaits) {
+  LetGo(a_);
+  ASSERT_TRUE(bindings_->budget().Reserve(kWeightBytes, "others need").ok());
+  const int64_t used = bindings_->budget().used();
+  const absl::Status left = bindings_
+                                ->Use("t", a_.record->id, "session s",
+                                      [&] {
+                                        bind_.AwaitBegun(3);
+                                        return false;
+                                      })
+                                .status();
+  EXPECT_EQ(left.code(), absl::StatusCode::kCancelled);
+  bind_.AwaitCancelled(1);
+  // The binding is free again, and so is the memory, once the job is gone.
+  bind_.Permit(1);
+  ASSERT_TRUE(bindings_->Use("t", a_.record->id, "session s").ok());
+  EXPECT_EQ(bindings_->budget().used(), used + kWeightBytes);
+}
+
+TEST_F(EvictionTest, ARemovedBindingIsNotFoundByItsLastComputation) {
+  LetGo(a_);
+  LetGo(b_);
+  ASSERT_TRUE(bindings_->budget().Reserve(kWeightBytes, "others need").ok());
+  const auto before = bindings_->Create(Spec(2)).value();
+  bind_.AwaitBegun(3);
+  ASSERT_TRUE(bindings_->Remove("t", a_.record->id).ok());
+  const auto after = bindings_->Create(Spec(2)).value();
+  bind_.Permit(2);
+  EXPECT_EQ((*before->Wait(kLong).value()).record, a_.record);
+  const auto created = *after->Wait(kLong).value();
+  EXPECT_FALSE(created.existed);
+  EXPECT_NE(created.record, a_.record);
 }
 
 TEST_F(BindingRegistryTest, EndsWhileComputing) {

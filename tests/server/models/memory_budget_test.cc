@@ -39,6 +39,51 @@ TEST(MemoryBudget, TakesBackWhatAReservationHeld) {
   EXPECT_EQ(budget.used(), 0);
 }
 
+TEST(MemoryBudget, ReservationsShrinkAndGrow) {
+  MemoryBudget budget(100, "limit");
+  auto held = budget.Reserve(60, "it needs").value();
+  ASSERT_TRUE(held.Resize(20, "it needs").ok());
+  EXPECT_EQ(budget.used(), 20);
+  ASSERT_TRUE(held.Resize(100, "it needs").ok());
+  EXPECT_EQ(held.bytes(), 100);
+  const absl::Status refused = held.Resize(130, "it needs");
+  EXPECT_EQ(refused.message(),
+            "it needs 30 B; 100 B of 100 B (limit) are in use: delete what is "
+            "no longer needed");
+  EXPECT_EQ(held.bytes(), 100);
+}
+
+TEST(MemoryBudget, APartOfAReservationGoesOnItsOwn) {
+  MemoryBudget budget(100, "limit");
+  auto held = budget.Reserve(60, "it needs").value();
+  {
+    const auto part = held.Split(40);
+    EXPECT_EQ(part.bytes(), 40);
+    EXPECT_EQ(held.bytes(), 20);
+    EXPECT_EQ(budget.used(), 60);
+  }
+  EXPECT_EQ(budget.used(), 20);
+}
+
+TEST(MemoryBudget, ReclaimsWhatNobodyNeeds) {
+  MemoryBudget::Reservation idle;
+  MemoryBudget budget(100, "limit", [&](int64_t missing) {
+    const int64_t bytes = idle.bytes();
+    if (bytes >= missing) idle = MemoryBudget::Reservation();
+    return bytes;
+  });
+  idle = budget.Reserve(30, "it needs").value();
+  const auto held = budget.Reserve(50, "it needs").value();
+  const absl::Status refused = budget.Reserve(51, "it needs").status();
+  EXPECT_EQ(
+      refused.message(),
+      "it needs 51 B; 50 B of 100 B (limit) are in use: delete what is no "
+      "longer needed");
+  EXPECT_EQ(idle.bytes(), 30) << "in vain";
+  EXPECT_TRUE(budget.Reserve(21, "it needs").ok());
+  EXPECT_EQ(budget.used(), 50);
+}
+
 TEST(MemoryBudget, CountsAMovedReservationOnce) {
   MemoryBudget budget(100, "limit");
   MemoryBudget::Reservation held;

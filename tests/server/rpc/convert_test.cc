@@ -246,16 +246,59 @@ TEST(ConvertRig, ComesBackAsItWas) {
   EXPECT_EQ(rig.SerializeAsString(), GoodRequest().rig().SerializeAsString());
 }
 
-TEST(ConvertBindingRecord, LeavesTheListsOutOfASummary) {
+class ConvertBindingRecord : public testing::Test {
+ protected:
+  BindingRecord RecordOf(const BindRequest& request) {
+    auto binding = Bind(request, {}).value();
+    auto memory =
+        cache_.budget().Reserve(binding->weights().bytes(), "weights need");
+    BindingRecord record{.facts = *binding, .weights = cache_.MakeSlot()};
+    record.weights->Put(std::move(binding), *std::move(memory));
+    return record;
+  }
+
+  WeightsCache cache_{3 * kBallBytes / 2, "limit"};
+  // 42 points in 3 tiles of 16, 8 vertices and 12 normals.
+  static constexpr int64_t kBallBytes = 48 * 20 * 4;
+};
+
+TEST_F(ConvertBindingRecord, TellsWhetherTheWeightsAreHere) {
+  const BindingRecord record = RecordOf(
+      {.model = std::make_shared<const Mesh>(MeshOf(Icosphere(0.5, 1))),
+       .rig = CageOf(Cube()),
+       .scheme = "green"});
+  v1::Binding binding;
+  ToProto(record, Detail::kSummary, &binding);
+  EXPECT_EQ(binding.weight_state(), v1::WEIGHT_STATE_RESIDENT);
+  EXPECT_EQ(binding.weight_bytes(), static_cast<uint64_t>(kBallBytes));
+  EXPECT_EQ(binding.weight_users(), 0u);
+  EXPECT_GT(binding.last_use_time().seconds(), 0);
+  const auto user = record.weights->Get();
+  ToProto(record, Detail::kSummary, &binding);
+  EXPECT_EQ(binding.weight_users(), 1u);
+}
+
+TEST_F(ConvertBindingRecord, TellsWhatIsKnownOfEvictedWeights) {
+  const BindingRecord record = RecordOf(
+      {.model = std::make_shared<const Mesh>(MeshOf(Icosphere(0.5, 1))),
+       .rig = CageOf(Cube()),
+       .scheme = "green"});
+  ASSERT_TRUE(cache_.budget().Reserve(kBallBytes, "others need").ok());
+  v1::Binding binding;
+  ToProto(record, Detail::kSummary, &binding);
+  EXPECT_EQ(binding.weight_state(), v1::WEIGHT_STATE_EVICTED);
+  EXPECT_EQ(binding.weight_bytes(), static_cast<uint64_t>(kBallBytes));
+  EXPECT_EQ(binding.normal_count(), 12u);
+}
+
+TEST_F(ConvertBindingRecord, LeavesTheListsOutOfASummary) {
   Shape ball = Icosphere(0.5, 1);
   ball.positions.row(3) << 5, 0, 0;  // Outside the cube.
-  BindingRecord record;
-  record.binding = Bind({.model = std::make_shared<const Mesh>(MeshOf(ball)),
-                         .rig = CageOf(Cube()),
-                         .scheme = "green",
-                         .unbindable = Unbindable::kReport},
-                        {})
-                       .value();
+  const BindingRecord record =
+      RecordOf({.model = std::make_shared<const Mesh>(MeshOf(ball)),
+                .rig = CageOf(Cube()),
+                .scheme = "green",
+                .unbindable = Unbindable::kReport});
   v1::Binding full;
   ToProto(record, Detail::kFull, &full);
   EXPECT_EQ(full.unbound_count(), 1u);

@@ -71,12 +71,31 @@ TEST_F(SessionManagerTest, RefusesSessionsBeyondTheMemoryLimit) {
 
 TEST_F(SessionManagerTest, TheBindingOfASessionCannotBeRemoved) {
   ASSERT_TRUE(sessions_.Create("t", rooms_.binding_id, "mine").ok());
-  const absl::Status used =
-      rooms_.bindings().Remove("t", rooms_.binding_id).status();
+  const absl::Status used = rooms_.bindings().Remove("t", rooms_.binding_id);
   EXPECT_THAT(std::string(used.message()),
               HasSubstr("is used by session mine"));
   ASSERT_TRUE(sessions_.Delete("t", "mine").ok());
   EXPECT_TRUE(rooms_.bindings().Remove("t", rooms_.binding_id).ok());
+}
+
+TEST_F(SessionManagerTest, WaitsForWeightsThatWereEvicted) {
+  rooms_.EvictWeights();
+  const auto session = sessions_.Create("t", rooms_.binding_id, "");
+  ASSERT_TRUE(session.ok()) << session.status();
+  EXPECT_EQ((*session)->binding().weights().points(), kBallPoints);
+}
+
+TEST_F(SessionManagerTest, GivesUpWaitingWithItsCaller) {
+  rooms_.EvictWeights();
+  rooms_.HoldBinding();
+  int asked = 0;
+  const auto session = sessions_.Create("t", rooms_.binding_id, "mine",
+                                        [&] { return ++asked < 2; });
+  EXPECT_EQ(session.status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(asked, 2);
+  // It left nothing behind.
+  EXPECT_TRUE(rooms_.bindings().Remove("t", rooms_.binding_id).ok());
+  rooms_.LetBindingGo();
 }
 
 TEST_F(SessionManagerTest, DeletingEndsTheStreams) {

@@ -5,6 +5,7 @@
 
 #include <deque>
 #include <functional>
+#include <future>
 #include <memory>
 #include <string>
 #include <vector>
@@ -115,16 +116,34 @@ class SessionRooms {
             .max_participants = 3,
             .stall_timeout = std::chrono::seconds(10)};
   }
-  BindingCatalogue& bindings() { return bindings_.catalogue(); }
+  BindingRegistry& bindings() { return bindings_; }
+
+  // Nobody uses them.
+  void EvictWeights() {
+    EXPECT_TRUE(bindings_.budget().Reserve(kMemory / 2, "others need").ok());
+    EXPECT_FALSE(bindings_.catalogue()
+                     .Find("t", binding_id)
+                     .value()
+                     ->weights->state()
+                     .resident);
+  }
+  // Computations do not begin until they are let go.
+  void HoldBinding() {
+    pool_.Submit([future = held_.get_future().share()] { future.wait(); });
+  }
+  void LetBindingGo() { held_.set_value(); }
 
   std::string binding_id;
 
  private:
   static constexpr ModelRegistry::Limits kModelLimits = {
       .model_bytes = 1 << 20, .memory = 1 << 20, .count = 10};
+  // Little more than the ball's binding takes.
+  static constexpr int64_t kMemory = 8000;
   static constexpr BindingRegistry::Limits kBindingLimits = {
-      .memory = 1 << 20, .count = 10, .concurrent = 1, .waiting_calls = 1};
+      .memory = kMemory, .count = 10, .concurrent = 1, .waiting_calls = 1};
 
+  std::promise<void> held_;
   ThreadPool pool_{{.threads = 1}};
   ModelRegistry models_{kModelLimits};
   BindingRegistry bindings_{models_, pool_, kBindingLimits};

@@ -52,7 +52,8 @@ void VisitOptions(SomeOptions& o, Visitor&& visit) {
   visit("max-models", o.max_models, 1, kMax, "Models of all tenants.");
   visit("max-bindings-memory", o.max_bindings_memory, 1, kMax,
         "Memory of all weights: 4 bytes per point and column, where columns "
-        "are cage vertices and faces, or handles.");
+        "are cage vertices and faces, or handles. Weights that no session uses "
+        "are dropped for others, and computed again when needed.");
   visit("max-bindings", o.max_bindings, 1, kMax, "Bindings of all tenants.");
   visit("max-concurrent-binds", o.max_concurrent_binds, 1, 1024,
         "Bindings computed at a time; others wait their turn.");

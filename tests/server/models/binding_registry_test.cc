@@ -330,6 +330,7 @@ TEST_F(EvictionTest, NeverGoesOverTheLimitWhileComputing) {
 }
 
 TEST_F(EvictionTest, KnowsAllButTheWeightsOfAnEvictedBinding) {
+  const double error = a_.binding->quality().reproduction_error;
   LetGo(a_);
   ASSERT_TRUE(bindings_->budget().Reserve(kWeightBytes, "others need").ok());
   const auto found = bindings_->catalogue().Find("t", a_.record->id).value();
@@ -337,7 +338,8 @@ TEST_F(EvictionTest, KnowsAllButTheWeightsOfAnEvictedBinding) {
   EXPECT_EQ(found->weights->state().bytes, kWeightBytes);
   EXPECT_EQ(found->facts.point_count(), 42);
   EXPECT_EQ(found->facts.normal_count(), 12);
-  EXPECT_LT(found->facts.quality().reproduction_error, 1e-14);
+  EXPECT_GT(error, 0);
+  EXPECT_EQ(found->facts.quality().reproduction_error, error);
   EXPECT_EQ(
       DetailOf(models_.catalogue().Remove("t", model_id_).status()).reason,
       "MODEL_IN_USE");

@@ -115,4 +115,15 @@ void ThreadPool::Work() {
   }
 }
 
+bool ParallelFor(ThreadPool* pool, int64_t count,
+                 const Cancellation* cancellation,
+                 absl::FunctionRef<void(int64_t)> body) {
+  if (pool != nullptr) return pool->ParallelFor(count, cancellation, body);
+  for (int64_t i = 0; i < count; ++i) {
+    if (cancellation != nullptr && cancellation->cancelled()) return false;
+    body(i);
+  }
+  return true;
+}
+
 }  // namespace deform

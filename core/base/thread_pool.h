@@ -51,4 +51,9 @@ class ThreadPool {
   std::vector<std::thread> threads_;
 };
 
+// pool->ParallelFor(), or, without a pool, the same on the caller's thread.
+bool ParallelFor(ThreadPool* pool, int64_t count,
+                 const Cancellation* cancellation,
+                 absl::FunctionRef<void(int64_t)> body);
+
 }  // namespace deform

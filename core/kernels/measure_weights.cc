@@ -19,10 +19,11 @@ constexpr hn::CappedTag<double, kTilePoints> kDoubles;
 using Doubles = hn::Vec<decltype(kDoubles)>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(kDoubles));
 
-// Sums of the points of one vector.
+// Of the points of one vector.
 struct Sums {
   Doubles position[3];
-  Doubles size;
+  Doubles size, total;
+  Doubles least, most;
 };
 
 // Adds columns [first, last); `tile` and `column` begin at column 0.
@@ -38,6 +39,9 @@ HWY_INLINE void Add(const float* HWY_RESTRICT tile,
           weight, hn::Set(kDoubles, column[3 * c + d]), sums.position[d]);
     }
     sums.size = sums.size + hn::Abs(weight);
+    sums.total = sums.total + weight;
+    sums.least = hn::Min(sums.least, weight);
+    sums.most = hn::Max(sums.most, weight);
   }
 }
 
@@ -45,9 +49,17 @@ void MeasureTile(const float* tile, int64_t columns, int64_t vertices,
                  const double* column, TileMeasures& measures) {
   const Doubles zero = hn::Zero(kDoubles);
   for (int at = 0; at < kTilePoints; at += kLanes) {
-    Sums sums = {{zero, zero, zero}, zero};
+    Sums sums = {{zero, zero, zero}, zero, zero, zero, zero};
+    if (vertices > 0) {
+      const hn::Rebind<float, decltype(kDoubles)> halves;
+      sums.least = hn::PromoteTo(kDoubles, hn::LoadU(halves, tile + at));
+      sums.most = sums.least;
+    }
     Add(tile + at, column, 0, vertices, sums);
     hn::Store(sums.size, kDoubles, measures.vertex_sum + at);
+    hn::Store(sums.total, kDoubles, measures.vertex_total + at);
+    hn::Store(sums.least, kDoubles, measures.vertex_min + at);
+    hn::Store(sums.most, kDoubles, measures.vertex_max + at);
     sums.size = zero;
     Add(tile + at, column, vertices, columns, sums);
     hn::Store(sums.size, kDoubles, measures.normal_sum + at);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "core/kernels/measure_weights.h"
@@ -15,6 +16,12 @@ void MeasureTilePlain(const float* tile, int64_t columns, int64_t vertices,
       }
       double* sum = c < vertices ? measures.vertex_sum : measures.normal_sum;
       sum[i] += std::abs(weight);
+      if (c >= vertices) continue;
+      measures.vertex_total[i] += weight;
+      measures.vertex_min[i] =
+          c == 0 ? weight : std::min(measures.vertex_min[i], weight);
+      measures.vertex_max[i] =
+          c == 0 ? weight : std::max(measures.vertex_max[i], weight);
     }
   }
 }

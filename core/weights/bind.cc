@@ -33,22 +33,13 @@ int64_t Columns(const Rig& rig, bool uses_normals) {
          (cage != nullptr && uses_normals ? cage->face_count() : 0);
 }
 
-// What the rows of some points showed. Merging does not depend on the order, so
-// neither do the figures on the threads.
+// What the rows of some points showed.
 struct Figures {
-  double reproduction_error = 0;
-  double weight_sum_max = 0;
-  int iterations_max = 0;
-  int64_t iterations = 0;
-  int64_t iterated_points = 0;
+  QualityTally tally;
   std::vector<int64_t> too_large;
 
   void Merge(const Figures& other) {
-    reproduction_error = std::max(reproduction_error, other.reproduction_error);
-    weight_sum_max = std::max(weight_sum_max, other.weight_sum_max);
-    iterations_max = std::max(iterations_max, other.iterations_max);
-    iterations += other.iterations;
-    iterated_points += other.iterated_points;
+    tally.Merge(other.tally);
     too_large.insert(too_large.end(), other.too_large.begin(),
                      other.too_large.end());
   }
@@ -125,17 +116,7 @@ Binder::Binder(const BindRequest& request, const BindControl& control,
 
 bool Binder::ForEach(int64_t count,
                      absl::FunctionRef<void(int64_t)> body) const {
-  if (control_.pool != nullptr) {
-    return control_.pool->ParallelFor(count, control_.cancellation, body);
-  }
-  for (int64_t i = 0; i < count; ++i) {
-    if (control_.cancellation != nullptr &&
-        control_.cancellation->cancelled()) {
-      return false;
-    }
-    body(i);
-  }
-  return true;
+  return ParallelFor(control_.pool, count, control_.cancellation, body);
 }
 
 void Binder::Measure(Block at, absl::FunctionRef<bool(int64_t)> wanted,
@@ -161,10 +142,12 @@ void Binder::Measure(Block at, absl::FunctionRef<bool(int64_t)> wanted,
     // Positions count from the middle of the rig: how coarse doubles are far
     // from the origin is not the weights' doing.
     const Vec3 eta = points().row(i).transpose() - center_;
-    figures.reproduction_error =
-        std::max(figures.reproduction_error, ((x - eta) / diagonal_).norm());
-    figures.weight_sum_max =
-        std::max(figures.weight_sum_max, measures.vertex_sum[lane]);
+    figures.tally.AddRow(
+        {.reproduction_error = ((x - eta) / diagonal_).norm(),
+         .partition_error = std::abs(measures.vertex_total[lane] - 1),
+         .weight_min = measures.vertex_min[lane],
+         .weight_max = measures.vertex_max[lane],
+         .weight_sum_max = measures.vertex_sum[lane]});
   }
 }
 
@@ -178,10 +161,7 @@ void Binder::EvaluateBlock(Block at) {
   Measure(at, bound, figures);
   for (int64_t i = 0; i < std::ssize(block.iterations); ++i) {
     if (!bound(at.first + i)) continue;
-    figures.iterations_max =
-        std::max<int>(figures.iterations_max, block.iterations[i]);
-    figures.iterations += block.iterations[i];
-    ++figures.iterated_points;
+    figures.tally.AddSearch(block.iterations[i], block.residuals[i]);
   }
   // Outside points wait for their exit face.
   const int64_t waiting = std::count(block.states.begin(), block.states.end(),
@@ -346,15 +326,7 @@ void Binder::Warn() {
 void Binder::Finish() {
   Warn();
   MutexLock lock(mutex_);
-  parts_.quality = {
-      .reproduction_error = figures_.reproduction_error,
-      .weight_sum_max = figures_.weight_sum_max,
-      .iterations_max = figures_.iterations_max,
-      .iterations_mean =
-          figures_.iterated_points == 0
-              ? 0
-              : static_cast<double>(figures_.iterations) /
-                    static_cast<double>(figures_.iterated_points)};
+  parts_.quality = figures_.tally.quality();
 }
 
 absl::Status CheckFits(const BindRequest& request) {

@@ -60,14 +60,19 @@ void Recomputation::Evaluate() {
 }
 
 void Recomputation::Copy(const WeightBlock& from, Block at) {
-  if (!from.iterations.empty()) block_.iterations.resize(range_.count);
+  if (!from.iterations.empty()) {
+    block_.iterations.resize(range_.count);
+    block_.residuals.resize(range_.count);
+  }
   for (int64_t i = 0; i < at.count; ++i) {
     if (!Contains(at.first + i)) continue;
     const int64_t to = at.first + i - range_.first;
     block_.vertex.row(to) = from.vertex.row(i);
     if (block_.normal.cols() > 0) block_.normal.row(to) = from.normal.row(i);
     block_.states[to] = from.states[i];
-    if (!from.iterations.empty()) block_.iterations[to] = from.iterations[i];
+    if (from.iterations.empty()) continue;
+    block_.iterations[to] = from.iterations[i];
+    block_.residuals[to] = from.residuals[i];
   }
 }
 

@@ -15,6 +15,7 @@
 #include "core/kernels/weight_tiles.h"
 #include "core/mesh/mesh.h"
 #include "core/mesh/rig.h"
+#include "core/weights/bind_quality.h"
 #include "core/weights/exit_regions.h"
 #include "core/weights/scheme.h"
 
@@ -37,19 +38,6 @@ struct BindControl {
   const Cancellation* cancellation = nullptr;
   // Points done so far; only rises. Read it from any thread.
   std::atomic<int64_t>* points_done = nullptr;
-};
-
-// Figures of how a binding came out.
-struct BindQuality {
-  // Largest |sum phi v + sum psi n - eta|, in units of D, of the weights as
-  // they are cached: rounding to float alone makes about 1e-7 of it, times the
-  // sum of |weight|. Positions count from the middle of the rig.
-  double reproduction_error = 0;
-  // Largest sum of |vertex weight| of a point.
-  double weight_sum_max = 0;
-  // Iterative schemes: largest and mean number of iterations.
-  int iterations_max = 0;
-  double iterations_mean = 0;
 };
 
 // What is known of a binding beside its weights: small, and enough to compute

@@ -136,6 +136,17 @@ bool CageFaces::MayBeWithin(double distance, int64_t f, const Vec3& x) const {
   return to_center * (1 - 1e-9) <= distance + face.radius * (1 + 1e-9);
 }
 
+CageFaces::Nearest CageFaces::NearestWithin(const Vec3& x,
+                                            double distance) const {
+  Nearest nearest{.distance = distance};
+  for (int64_t f = 0; f < size(); ++f) {
+    if (!MayBeWithin(nearest.distance, f, x)) continue;
+    const Nearest candidate = NearestOn(f, x);
+    if (candidate.distance < nearest.distance) nearest = candidate;
+  }
+  return nearest;
+}
+
 CageFaces::Nearest CageFaces::NearestOf(const Vec3& x,
                                         std::span<const char> allowed) const {
   Nearest nearest;

@@ -51,6 +51,9 @@ class CageFaces {
   // Closest point of the faces whose entry in `allowed` is not 0 (empty: of
   // all faces); of several the face with the lowest index.
   Nearest NearestOf(const Vec3& x, std::span<const char> allowed = {}) const;
+  // Closest point of all faces if it is nearer than `distance`; else face -1
+  // and that distance. The smaller it is, the fewer faces are looked at.
+  Nearest NearestWithin(const Vec3& x, double distance) const;
 
  private:
   // False only if face f is farther from x than `distance`.

@@ -34,6 +34,7 @@ void WeightEvaluator::EvaluateTiles(const PositionsRef& points,
   }
   block.states = std::move(doubles.states);
   block.iterations = std::move(doubles.iterations);
+  block.residuals = std::move(doubles.residuals);
 }
 
 }  // namespace deform

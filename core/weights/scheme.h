@@ -48,8 +48,12 @@ using RowMatrix =
 struct WeightBlock {
   RowMatrix vertex;  // n x V, no unit; every bound row sums to 1.
   RowMatrix normal;  // n x F, model units; n x 0 if normals are not used.
-  std::vector<PointState> states;    // n
-  std::vector<uint16_t> iterations;  // n for iterative schemes, else empty.
+  std::vector<PointState> states;  // n
+  // n for iterative schemes, else empty. The residual is how far a point is
+  // from solving its equations, without unit: |sum beta q| / sum beta of
+  // celestial coordinates. 0 for points that needed no search.
+  std::vector<uint16_t> iterations;
+  std::vector<double> residuals;
 };
 
 // Weights of a block of points as they are cached: float, in tiles.
@@ -58,8 +62,10 @@ struct TileBlock {
   // V + F columns. Every weight is written; padding with 0, and what float
   // cannot hold with infinity.
   float* tiles = nullptr;
-  std::vector<PointState> states;    // n
-  std::vector<uint16_t> iterations;  // n for iterative schemes, else empty.
+  // As in WeightBlock.
+  std::vector<PointState> states;
+  std::vector<uint16_t> iterations;
+  std::vector<double> residuals;
 };
 
 // To be added to a weight. Columns count the vertices, then the normals.
@@ -91,6 +97,16 @@ class WeightEvaluator {
   virtual std::array<WeightShare, 4> Extend(const Vec3& /*point*/,
                                             int64_t /*exit_face*/) const {
     return {};
+  }
+
+  // Sets the gradients of the weights with respect to the point: `vertex` is
+  // V x 3, `normal` F x 3. `exit_face` is the one the point is extended
+  // through, or -1. The point does not lie on the rig. Returns false, with
+  // nothing set, if the scheme has no closed form: differences are to be taken.
+  virtual bool Differentiate(const Vec3& /*point*/, int64_t /*exit_face*/,
+                             Eigen::Ref<Positions> /*vertex*/,
+                             Eigen::Ref<Positions> /*normal*/) const {
+    return false;
   }
 };
 

@@ -62,6 +62,8 @@ const std::map<std::string, std::vector<std::string>>& CoreArrows() {
           {"core/weights", {"core/base", "core/mesh", "core/kernels"}},
           {"core/deform",
            {"core/base", "core/mesh", "core/kernels", "core/weights"}},
+          {"core/quality",
+           {"core/base", "core/mesh", "core/weights", "core/deform"}},
           {"core/frames",
            {"core/base", "core/mesh", "core/weights", "core/deform"}},
       };

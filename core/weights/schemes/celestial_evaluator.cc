@@ -59,6 +59,7 @@ class CelestialEvaluator final : public WeightEvaluator {
     block.normal.resize(n, 0);
     block.states.assign(static_cast<size_t>(n), PointState::kInside);
     block.iterations.assign(static_cast<size_t>(n), 0);
+    block.residuals.assign(static_cast<size_t>(n), 0.0);
     if (n == 0) return;
     const std::vector<int32_t> order = Ordered(points);
     if (way_ == CelestialWay::kLanes) {
@@ -81,6 +82,7 @@ class CelestialEvaluator final : public WeightEvaluator {
     const AlignedArray<double> scratch(8 * lanes * handles);
     const AlignedArray<double> weights(lanes * handles);
     const AlignedArray<double> solution(3 * lanes);
+    const AlignedArray<double> residual(lanes);
     const AlignedArray<double> places(3 * lanes);
     CelestialLaneJob job = {
         .handles = handles,
@@ -91,7 +93,8 @@ class CelestialEvaluator final : public WeightEvaluator {
         .points = places.get(),
         .scratch = scratch.get(),
         .weights = weights.get(),
-        .solution = solution.get()};
+        .solution = solution.get(),
+        .residual = residual.get()};
     Directions directions;
     directions.Resize(handles);
     Vec3 start = Vec3::Zero();
@@ -115,6 +118,7 @@ class CelestialEvaluator final : public WeightEvaluator {
             row[k] = weights[k * lanes + lane];
           }
           block.iterations[i] = static_cast<uint16_t>(job.steps);
+          block.residuals[i] = residual[lane];
           continue;
         }
         hard = EvaluatePoint(i, points.row(i), hard, directions, block);
@@ -141,6 +145,7 @@ class CelestialEvaluator final : public WeightEvaluator {
     block.states[i] = solved.state;
     block.iterations[i] =
         static_cast<uint16_t>(std::min(solved.iterations, 0xffff));
+    block.residuals[i] = solved.residual;
     return solved.y;
   }
 

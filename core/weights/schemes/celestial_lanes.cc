@@ -251,9 +251,10 @@ HWY_INLINE LaneMask Arrive(const Potential& potential, const Arrays& arrays,
   }
 }
 
-// Writes the weights, and returns the lanes that they solve.
+// Writes the weights and their residuals, and returns the lanes solved.
 HWY_INLINE LaneMask Spread(const Arrays& arrays, const LaneTriple& step,
-                           int64_t n, double* HWY_RESTRICT weights) {
+                           int64_t n, double* HWY_RESTRICT weights,
+                           double* HWY_RESTRICT residual) {
   constexpr Doubles d;
   Lane sum = hn::Zero(d);
   Lane total = sum;
@@ -279,8 +280,9 @@ HWY_INLINE LaneMask Spread(const Arrays& arrays, const LaneTriple& step,
     double* weight = weights + i * kLanes;
     hn::Store(hn::Load(d, weight) * scale, d, weight);
   }
-  const Lane bound = hn::Set(d, kSolvedResidual) * sum;
-  return hn::And(gradient.Dot(gradient) <= bound * bound,
+  const Lane distance = hn::Sqrt(gradient.Dot(gradient)) / sum;
+  hn::Store(distance, d, residual);
+  return hn::And(distance <= hn::Set(d, kSolvedResidual),
                  most < hn::Set(d, kHullContrast) * least);
 }
 
@@ -295,7 +297,7 @@ HWY_INLINE void SolveIn(const Potential& potential, CelestialLaneJob& job) {
   Approach(potential, arrays, job);
   LaneTriple step;
   const LaneMask near = Arrive(potential, arrays, job, step);
-  const LaneMask exact = Spread(arrays, step, n, job.weights);
+  const LaneMask exact = Spread(arrays, step, n, job.weights, job.residual);
   uint8_t bits[8] = {};
   hn::StoreMaskBits(kDoubles, hn::And(clear, hn::And(near, exact)), bits);
   job.solved = bits[0];

@@ -29,6 +29,7 @@ struct CelestialLaneJob {
 
   double* weights;   // n x L; they sum to 1 in each solved lane.
   double* solution;  // 3 x L: where to start, then where the search ended.
+  double* residual;  // L: |sum beta q| / sum beta of the weights.
   // Out. A lane is solved if its bit is set; others hold nothing of use.
   uint32_t solved;
   int steps;  // Newton steps.

@@ -105,7 +105,7 @@ class PointSolver {
       std::fill(weights.begin(), weights.end(), 0);
       return {PointState::kNotConverged, steps_};
     }
-    return {PointState::kInside, steps_, solution.y};
+    return {PointState::kInside, steps_, solution.y, solution.residual};
   }
 
   // A plane with normal `separator` has all handles on its far side. Unless

@@ -19,6 +19,7 @@ struct CelestialPoint {
   int iterations = 0;  // Newton steps, restarts included.
   // Where the search ended: a start for neighbours. 0 if there is no solution.
   WideVec3 y = WideVec3::Zero();
+  double residual = 0;  // |sum beta q| / sum beta of a bound point.
 };
 
 // Solves for the n `weights` of the point from which `directions` look; all 0

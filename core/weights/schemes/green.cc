@@ -17,6 +17,7 @@
 #include "core/base/error.h"
 #include "core/mesh/rig.h"
 #include "core/weights/cage_faces.h"
+#include "core/weights/schemes/green_gradient.h"
 #include "core/weights/schemes/green_lanes.h"
 
 namespace deform {
@@ -37,6 +38,9 @@ class GreenEvaluator final : public LaneEvaluator {
 
   std::array<WeightShare, 4> Extend(const Vec3& point,
                                     int64_t exit_face) const override;
+  bool Differentiate(const Vec3& point, int64_t exit_face,
+                     Eigen::Ref<Positions> vertex,
+                     Eigen::Ref<Positions> normal) const override;
 
  private:
   PointState EvaluatePoint(const Vec3& eta, std::span<double> phi,
@@ -106,6 +110,20 @@ std::array<WeightShare, 4> GreenEvaluator::Extend(const Vec3& point,
   }
   shares[3] = {vertices_ + exit_face, beta};
   return shares;
+}
+
+// The closure is rounding; what is left of it is constant.
+bool GreenEvaluator::Differentiate(const Vec3& point, int64_t exit_face,
+                                   Eigen::Ref<Positions> vertex,
+                                   Eigen::Ref<Positions> normal) const {
+  GreenGradients(faces_, point, vertex, normal);
+  if (exit_face < 0) return true;
+  const CageFaces::Face& face = faces_[exit_face];
+  for (int k = 0; k < faces_.corners(); ++k) {
+    vertex.row(face.corner[k]) -= face.m[k].transpose() / face.height[k];
+  }
+  normal.row(exit_face) += face.normal.transpose();
+  return true;
 }
 
 class Green : public CoordinateScheme {

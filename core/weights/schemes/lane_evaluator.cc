@@ -67,6 +67,7 @@ void LaneEvaluator::Evaluate(const PositionsRef& points,
   block.normal.resize(n, normals_);
   block.states.resize(n);
   block.iterations.clear();
+  block.residuals.clear();
   if (way_ == Way::kPlain) return EvaluatePlain(points, block);
   const AlignedArray<char> scratch(ScratchBytes());
   const AlignedArray<double> tile(columns() * kTilePoints);
@@ -94,6 +95,7 @@ void LaneEvaluator::EvaluateTiles(const PositionsRef& points,
   const int64_t n = points.rows();
   block.states.resize(n);
   block.iterations.clear();
+  block.residuals.clear();
   const AlignedArray<char> scratch(ScratchBytes());
   std::vector<double> row(columns());
   const std::span<double> vertex = std::span(row).first(vertices_);

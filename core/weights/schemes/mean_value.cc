@@ -136,6 +136,7 @@ class MeanValueEvaluator final : public WeightEvaluator {
     block.normal.resize(n, 0);
     block.states.resize(static_cast<size_t>(n));
     block.iterations.clear();
+    block.residuals.clear();
     for (int64_t i = 0; i < n; ++i) {
       const Weights row(block.vertex.row(i).data(),
                         static_cast<size_t>(vertices_));

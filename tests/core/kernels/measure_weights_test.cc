@@ -47,6 +47,9 @@ class MeasureWeightsOn : public testing::TestWithParam<int64_t> {
       }
       EXPECT_NEAR(fast.vertex_sum[i], plain.vertex_sum[i], 1e-14);
       EXPECT_NEAR(fast.normal_sum[i], plain.normal_sum[i], 1e-14);
+      EXPECT_NEAR(fast.vertex_total[i], plain.vertex_total[i], 1e-14);
+      EXPECT_EQ(fast.vertex_min[i], plain.vertex_min[i]);
+      EXPECT_EQ(fast.vertex_max[i], plain.vertex_max[i]);
     }
   }
 
@@ -59,6 +62,20 @@ TEST_P(MeasureWeightsOn, AgreesWithThePlainVersion) {
   ExpectAsPlain(kVertices, kVertices);
   ExpectAsPlain(1, 1);
   ExpectAsPlain(0, 0);
+}
+
+TEST_P(MeasureWeightsOn, FindsTheEndsAmongTheVerticesAlone) {
+  for (int64_t c = 0; c < kColumns; ++c) {
+    tile_.set(5, c, static_cast<float>(c + 1));
+    tile_.set(6, c, static_cast<float>(-c - 1));
+  }
+  TileMeasures measures;
+  MeasureTile(tile_.tile(0), kColumns, kVertices, column_.data(), measures);
+  EXPECT_EQ(measures.vertex_min[5], 1);
+  EXPECT_EQ(measures.vertex_max[5], kVertices);
+  EXPECT_EQ(measures.vertex_total[5], kVertices * (kVertices + 1) / 2);
+  EXPECT_EQ(measures.vertex_min[6], -kVertices);
+  EXPECT_EQ(measures.vertex_max[6], -1);
 }
 
 TEST_P(MeasureWeightsOn, ShowsWhichPointHasAWeightThatIsNotFinite) {

@@ -1,6 +1,7 @@
 // The lane solver, judged by the plain one on every instruction set.
 #include "core/weights/schemes/celestial_lanes.h"
 
+#include <algorithm>
 #include <random>
 #include <string>
 #include <vector>
@@ -91,6 +92,11 @@ class CelestialLanesOn : public testing::TestWithParam<Case> {
     if (points.rows() == 0) return;
     // Both end at the rounding floor; inside a cube that is 1e-14.
     EXPECT_LT((fast.vertex - plain.vertex).cwiseAbs().maxCoeff(), 1e-12);
+    ASSERT_EQ(fast.residuals.size(), plain.residuals.size());
+    for (size_t i = 0; i < plain.residuals.size(); ++i) {
+      // What lanes call solved is below 1e-14; the rest is the plain way's.
+      EXPECT_LE(fast.residuals[i], std::max(1e-14, plain.residuals[i]));
+    }
   }
 };
 
@@ -171,6 +177,7 @@ TEST_P(CelestialLanesOn, SolveNearlyAllPointsOfAModelThemselves) {
       }
     }
     alignas(64) double solution[3 * kMaxCelestialLanes] = {};
+    alignas(64) double residual[kMaxCelestialLanes];
     CelestialLaneJob job = {.handles = kHandles,
                             .x = columns.col(0).data(),
                             .y = columns.col(1).data(),
@@ -179,7 +186,8 @@ TEST_P(CelestialLanesOn, SolveNearlyAllPointsOfAModelThemselves) {
                             .points = points,
                             .scratch = scratch,
                             .weights = weights,
-                            .solution = solution};
+                            .solution = solution,
+                            .residual = residual};
     SolveCelestialLanes(job);
     for (int lane = 0; lane < lanes; ++lane) {
       unsolved += !(job.solved >> lane & 1);

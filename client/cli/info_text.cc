@@ -69,6 +69,19 @@ Json ToJson(const ModelInfo& model) {
           {"create_time", TimeText(model.create_time)}};
 }
 
+Json ToJson(const BindQuality& quality) {
+  return {{"reproduction_error", quality.reproduction_error},
+          {"partition_error", quality.partition_error},
+          {"weight_min", quality.weight_min},
+          {"weight_max", quality.weight_max},
+          {"weight_sum_max", quality.weight_sum_max},
+          {"iterations_total", quality.iterations_total},
+          {"iterations_max", quality.iterations_max},
+          {"iterations_mean", quality.iterations_mean},
+          {"residual_max", quality.residual_max},
+          {"residual_mean", quality.residual_mean}};
+}
+
 Json ToJson(const BindingInfo& binding) {
   Json unbound = Json::array();
   for (const UnboundInfo& group : binding.unbound) {
@@ -96,8 +109,7 @@ Json ToJson(const BindingInfo& binding) {
           {"weight_users", binding.weight_users},
           {"last_use_time", TimeText(binding.last_use_time)},
           {"compute_seconds", binding.compute_seconds},
-          {"reproduction_error", binding.reproduction_error},
-          {"weight_sum_max", binding.weight_sum_max},
+          {"quality", ToJson(binding.quality)},
           {"unbound_count", binding.unbound_count},
           {"unbound", unbound},
           {"exit_parts", parts},
@@ -159,11 +171,21 @@ void Describe(const BindingInfo& binding, std::ostream& out) {
   properties.Add("kept", absl::StrFormat("%s; %d users, last use %s", kept,
                                          binding.weight_users,
                                          TimeText(binding.last_use_time)));
+  const BindQuality& quality = binding.quality;
   properties.Add(
       "quality",
-      absl::StrFormat("reproduces the model to %.2g of the "
-                      "diagonal; largest sum of |weight| %.3g",
-                      binding.reproduction_error, binding.weight_sum_max));
+      absl::StrFormat("reproduces the model to %.2g of the diagonal; weights "
+                      "%.3g to %.3g, sum to 1 within %.2g",
+                      quality.reproduction_error, quality.weight_min,
+                      quality.weight_max, quality.partition_error));
+  if (quality.iterations_total > 0) {
+    properties.Add(
+        "solver",
+        absl::StrFormat("%.1f steps a point, %d at most; residual "
+                        "%.2g, %.2g at most",
+                        quality.iterations_mean, quality.iterations_max,
+                        quality.residual_mean, quality.residual_max));
+  }
   for (const ExitPartInfo& part : binding.exit_parts) {
     std::string crossed;
     if (!part.crossed_faces.empty()) {

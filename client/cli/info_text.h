@@ -9,6 +9,7 @@
 namespace deform::cli {
 
 Json ToJson(const ModelInfo& model);
+Json ToJson(const BindQuality& quality);
 Json ToJson(const BindingInfo& binding);
 Json ToJson(const SessionInfo& session);
 Json ToJson(const SchemeInfo& scheme);

@@ -260,6 +260,37 @@ absl::Status Client::GetWeights(
   return status.ok() ? end : status;
 }
 
+absl::StatusOr<QualityInfo> Client::GetQuality(const QualityQuery& query) {
+  v1::GetQualityRequest request;
+  request.set_tenant(impl_->options.tenant);
+  request.set_binding_id(query.binding_id);
+  request.set_max_points(static_cast<uint32_t>(
+      std::clamp<int64_t>(query.max_points, 0, UINT32_MAX)));
+  request.set_with_points(query.with_points);
+  if (query.pose) {
+    DEFORM_ASSIGN_OR_RETURN(const BindingInfo binding,
+                            GetBinding(query.binding_id));
+    *request.mutable_pose() = ToProto(*query.pose, binding.dimension, 0);
+  } else if (!query.session_id.empty()) {
+    request.set_session_id(query.session_id);
+  }
+  grpc::ClientContext context;
+  const auto call = impl_->bindings->GetQuality(&context, request);
+  v1::GetQualityResponse response;
+  absl::StatusOr<QualityInfo> info =
+      absl::InternalError("the server ended without a report");
+  while (call->Read(&response)) {
+    if (response.has_report()) {
+      info = FromProto(response.report());
+    } else if (info.ok()) {
+      const absl::Status added = AddPoints(response.points(), *info);
+      if (!added.ok()) info = added;
+    }
+  }
+  DEFORM_RETURN_IF_ERROR(FromGrpc(call->Finish()));
+  return info;
+}
+
 absl::StatusOr<std::vector<SchemeInfo>> Client::ListSchemes() {
   v1::ListSchemesResponse response;
   DEFORM_RETURN_IF_ERROR(impl_->Call(*impl_->bindings,

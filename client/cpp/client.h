@@ -20,6 +20,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,7 +40,8 @@ struct ClientOptions {
   // How long Connect() waits for the server.
   std::chrono::milliseconds connect_timeout{5000};
   // How long a call without work behind it may take (all but RegisterModel,
-  // CreateBinding, GetWeights and Deform, which take as long as they need).
+  // CreateBinding, GetWeights, GetQuality and Deform, which take as long as
+  // they need).
   std::chrono::milliseconds call_timeout{30000};
 };
 
@@ -53,6 +55,18 @@ struct WeightRows {
   int64_t first_point = 0;
   RowMatrix vertex;  // rows x V; rows of unbound points are 0.
   RowMatrix normal;  // rows x normal_count, model units.
+};
+
+// What GetQuality() is to judge.
+struct QualityQuery {
+  std::string binding_id;
+  // One of them, or neither: then only the binding is reported on.
+  std::optional<PoseUpdate> pose;  // Vertices that are not named rest.
+  std::string session_id;          // Its present pose.
+  // A model with more points is judged by a sample; 0: the server's default.
+  int64_t max_points = 0;
+  // Also fetch the values of the points measured.
+  bool with_points = false;
 };
 
 // Done and total: bytes of an upload, points of a binding. Called on the
@@ -94,6 +108,9 @@ class Client {
   absl::Status GetWeights(
       absl::string_view binding_id, WeightPrecision precision, int64_t first,
       int64_t count, absl::FunctionRef<absl::Status(const WeightRows&)> rows);
+
+  // How a binding came out, and what a pose does to its model.
+  absl::StatusOr<QualityInfo> GetQuality(const QualityQuery& query);
 
   absl::StatusOr<std::vector<SchemeInfo>> ListSchemes();
 

@@ -32,6 +32,43 @@ absl::Status BadAnswer(absl::string_view what) {
                       absl::StrCat("the server's answer does not fit: ", what));
 }
 
+VolumeKind FromProto(v1::VolumeKind kind) {
+  switch (kind) {
+    case v1::VOLUME_KIND_CLOSED:
+      return VolumeKind::kClosed;
+    case v1::VOLUME_KIND_CAPPED:
+      return VolumeKind::kCapped;
+    case v1::VOLUME_KIND_AREA:
+      return VolumeKind::kArea;
+    default:
+      return VolumeKind::kNone;
+  }
+}
+
+PoseQuality FromProto(const v1::PoseQuality& quality) {
+  const auto& edges = quality.distortion_edges();
+  const auto& counts = quality.distortion_counts();
+  return {.sampled = quality.sampled(),
+          .near_rig = static_cast<int64_t>(quality.near_rig_count()),
+          .fixed = static_cast<int64_t>(quality.fixed_count()),
+          .distortion_max = quality.distortion_max(),
+          .distortion_p99 = quality.distortion_p99(),
+          .distortion_median = quality.distortion_median(),
+          .most_distorted =
+              quality.has_most_distorted_point()
+                  ? static_cast<int64_t>(quality.most_distorted_point())
+                  : -1,
+          .distortion = {{edges.begin(), edges.end()},
+                         {counts.begin(), counts.end()}},
+          .fold_overs = static_cast<int64_t>(quality.fold_over_count()),
+          .volume_change_min = quality.volume_change_min(),
+          .volume_change_median = quality.volume_change_median(),
+          .volume_change_max = quality.volume_change_max(),
+          .volume_kind = FromProto(quality.volume_kind()),
+          .volume_rest = quality.volume_rest(),
+          .volume_posed = quality.volume_posed()};
+}
+
 template <typename Repeated>
 void AppendRows(const PositionsRef& rows, int columns, Repeated* out) {
   out->Reserve(static_cast<int>(rows.rows() * columns));
@@ -130,6 +167,42 @@ ModelInfo FromProto(const v1::Model& model) {
           .create_time = FromProto(model.create_time())};
 }
 
+BindQuality FromProto(const v1::BindingQuality& quality) {
+  return {.reproduction_error = quality.reproduction_error(),
+          .partition_error = quality.partition_error(),
+          .weight_min = quality.weight_min(),
+          .weight_max = quality.weight_max(),
+          .weight_sum_max = quality.weight_sum_max(),
+          .iterations_total = static_cast<int64_t>(quality.iterations_total()),
+          .iterations_max = static_cast<int>(quality.iterations_max()),
+          .iterations_mean = quality.iterations_mean(),
+          .residual_max = quality.residual_max(),
+          .residual_mean = quality.residual_mean()};
+}
+
+QualityInfo FromProto(const v1::QualityReport& report) {
+  QualityInfo info{.binding = FromProto(report.binding()),
+                   .rig_distance_min = report.rig_distance_min()};
+  if (report.has_pose()) {
+    info.pose = FromProto(report.pose());
+    info.points_measured = static_cast<int64_t>(report.pose().point_count());
+  }
+  return info;
+}
+
+absl::Status AddPoints(const v1::QualityPoints& points, QualityInfo& info) {
+  if (!info.pose || points.distortion_size() != points.points_size() ||
+      points.volume_change_size() != points.points_size()) {
+    return BadAnswer("points");
+  }
+  for (int i = 0; i < points.points_size(); ++i) {
+    info.pose->points.push_back({static_cast<int64_t>(points.points(i)),
+                                 points.distortion(i),
+                                 points.volume_change(i)});
+  }
+  return absl::OkStatus();
+}
+
 BindingInfo FromProto(const v1::Binding& binding) {
   BindingInfo info{
       .binding_id = binding.binding_id(),
@@ -147,8 +220,7 @@ BindingInfo FromProto(const v1::Binding& binding) {
       .weight_users = static_cast<int>(binding.weight_users()),
       .last_use_time = FromProto(binding.last_use_time()),
       .compute_seconds = binding.compute_seconds(),
-      .reproduction_error = binding.reproduction_error(),
-      .weight_sum_max = binding.weight_sum_max(),
+      .quality = FromProto(binding.quality()),
       .unbound_count = static_cast<int64_t>(binding.unbound_count()),
       .warnings = {binding.warnings().begin(), binding.warnings().end()},
       .create_time = FromProto(binding.create_time()),

@@ -7,12 +7,15 @@
 #include "core/deform/pose.h"
 #include "deform/v1/binding.pb.h"
 #include "deform/v1/model.pb.h"
+#include "deform/v1/quality.pb.h"
 #include "deform/v1/session.pb.h"
 
 namespace deform {
 
 ModelInfo FromProto(const v1::Model& model);
+BindQuality FromProto(const v1::BindingQuality& quality);
 BindingInfo FromProto(const v1::Binding& binding);
+QualityInfo FromProto(const v1::QualityReport& report);
 SessionInfo FromProto(const v1::Session& session);
 SchemeInfo FromProto(const v1::Scheme& scheme);
 
@@ -20,6 +23,10 @@ SchemeInfo FromProto(const v1::Scheme& scheme);
 absl::StatusOr<RigArrays> FromProto(const v1::Rig& rig);
 absl::StatusOr<WeightRows> FromProto(const v1::GetWeightsResponse& weights);
 absl::StatusOr<JoinedSession> FromProto(const v1::Joined& joined);
+
+// Adds to the points of the pose. InvalidArgument (BAD_ANSWER) if the numbers
+// do not fit together.
+absl::Status AddPoints(const v1::QualityPoints& points, QualityInfo& info);
 
 // `tenant` and `model_id` included.
 v1::CreateBindingRequest ToProto(const BindingSpec& spec,

@@ -3,10 +3,13 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/mesh/types.h"
+#include "core/quality/pose_quality.h"
+#include "core/weights/bind_quality.h"
 
 namespace deform {
 
@@ -60,8 +63,7 @@ struct BindingInfo {
   int weight_users = 0;  // Sessions and calls; they keep the weights resident.
   WallTime last_use_time;
   double compute_seconds = 0;
-  double reproduction_error = 0;  // In units of D.
-  double weight_sum_max = 0;
+  BindQuality quality;
   int64_t unbound_count = 0;
   std::vector<UnboundInfo> unbound;
   std::vector<ExitPartInfo> exit_parts;
@@ -69,6 +71,15 @@ struct BindingInfo {
   WallTime create_time;
   // From CreateBinding only: it was there before.
   bool existed = false;
+};
+
+// Figures as core/quality computes them; their units and limits are told there.
+struct QualityInfo {
+  BindQuality binding;
+  double rig_distance_min = 0;  // Of a bound point, in units of D.
+  // If a pose was named. Its points only if they were asked for.
+  std::optional<PoseQuality> pose;
+  int64_t points_measured = 0;
 };
 
 struct SessionInfo {

@@ -7,6 +7,7 @@
 #include "core/base/status_macros.h"
 #include "core/weights/scheme.h"
 #include "server/rpc/convert.h"
+#include "server/rpc/quality.h"
 #include "server/rpc/weight_rows.h"
 
 namespace deform::server {
@@ -59,6 +60,24 @@ absl::StatusOr<v1::GetWeightsResponse> RowsAgain(const BindingFacts& binding,
   auto rows = task.get_future();
   pool.Submit([&] { task(); });
   return rows.get();
+}
+
+// Measures with the priority of `pool`. What the task refers to is the
+// caller's, so a caller who has left is waited for: a block of points at most.
+absl::StatusOr<Quality> Measure(const QualityTask& what, ThreadPool& pool,
+                                grpc::ServerContext& context,
+                                CallRunner::Watch& watch) {
+  Cancellation cancellation;
+  const auto task =
+      std::make_shared<std::packaged_task<absl::StatusOr<Quality>()>>(
+          [&] { return MeasureQuality(what, pool, cancellation); });
+  auto quality = task->get_future();
+  pool.Submit([task] { (*task)(); });
+  while (quality.wait_for(kPollInterval) != std::future_status::ready) {
+    if (context.IsCancelled()) cancellation.Cancel();
+    watch.Progressed();
+  }
+  return quality.get();
 }
 
 }  // namespace
@@ -175,6 +194,41 @@ grpc::Status BindingService::GetWeights(
       watch.Progressed();
       left.first += block.count;
       left.count -= block.count;
+    }
+    return absl::OkStatus();
+  });
+}
+
+grpc::Status BindingService::GetQuality(
+    grpc::ServerContext* context, const v1::GetQualityRequest* request,
+    grpc::ServerWriter<v1::GetQualityResponse>* writer) {
+  return calls_.Run("GetQuality", *context, [&]() -> absl::Status {
+    CallRunner::Watch watch(calls_, *context);
+    DEFORM_ASSIGN_OR_RETURN(const std::string tenant,
+                            TenantOr(request->tenant()));
+    DEFORM_ASSIGN_OR_RETURN(
+        const auto record,
+        bindings_.catalogue().Find(tenant, request->binding_id()));
+    DEFORM_ASSIGN_OR_RETURN(
+        QualityTask task, ToQualityTask(*request, tenant, *record, sessions_));
+    if (task.posed) {
+      DEFORM_ASSIGN_OR_RETURN(task.binding, bindings_.WeightsOf(record, [&] {
+        watch.Progressed();
+        return !context->IsCancelled();
+      }));
+    }
+    DEFORM_ASSIGN_OR_RETURN(const Quality quality,
+                            Measure(task, background_, *context, watch));
+    v1::GetQualityResponse message;
+    *message.mutable_report() = ToProto(quality);
+    if (!writer->Write(message)) return absl::CancelledError();
+    const int64_t points = request->with_points() && quality.pose
+                               ? std::ssize(quality.pose->points)
+                               : 0;
+    for (int64_t i = 0; i < points; i += kQualityPointsPerMessage) {
+      *message.mutable_points() = ToProto(*quality.pose, i);
+      watch.Progressed();
+      if (!writer->Write(message)) return absl::CancelledError();
     }
     return absl::OkStatus();
   });

@@ -6,15 +6,19 @@
 #include "server/models/binding_registry.h"
 #include "server/rpc/calls.h"
 #include "server/rpc/convert.h"
+#include "server/sessions/session_manager.h"
 
 namespace deform::server {
 
 class BindingService final : public v1::BindingService::Service {
  public:
-  // All are borrowed. `background` recomputes weights.
+  // All are borrowed. `background` recomputes weights and measures quality.
   BindingService(CallRunner& calls, BindingRegistry& bindings,
-                 ThreadPool& background)
-      : calls_(calls), bindings_(bindings), background_(background) {}
+                 SessionManager& sessions, ThreadPool& background)
+      : calls_(calls),
+        bindings_(bindings),
+        sessions_(sessions),
+        background_(background) {}
 
   grpc::Status CreateBinding(
       grpc::ServerContext* context, const v1::CreateBindingRequest* request,
@@ -31,6 +35,9 @@ class BindingService final : public v1::BindingService::Service {
   grpc::Status GetWeights(
       grpc::ServerContext* context, const v1::GetWeightsRequest* request,
       grpc::ServerWriter<v1::GetWeightsResponse>* writer) override;
+  grpc::Status GetQuality(
+      grpc::ServerContext* context, const v1::GetQualityRequest* request,
+      grpc::ServerWriter<v1::GetQualityResponse>* writer) override;
   grpc::Status ListSchemes(grpc::ServerContext* context,
                            const v1::ListSchemesRequest* request,
                            v1::ListSchemesResponse* response) override;
@@ -41,6 +48,7 @@ class BindingService final : public v1::BindingService::Service {
 
   CallRunner& calls_;
   BindingRegistry& bindings_;
+  SessionManager& sessions_;
   ThreadPool& background_;
 };
 

@@ -284,8 +284,7 @@ void ToProto(const BindingRecord& record, Detail detail, v1::Binding* out) {
   out->set_weight_users(weights.users);
   ToProto(weights.last_use, out->mutable_last_use_time());
   out->set_compute_seconds(binding.compute_seconds());
-  out->set_reproduction_error(binding.quality().reproduction_error);
-  out->set_weight_sum_max(binding.quality().weight_sum_max);
+  ToProto(binding.quality(), out->mutable_quality());
   out->set_unbound_count(binding.unbound_count());
   ToProto(record.create_time, out->mutable_create_time());
   if (detail == Detail::kSummary) return;
@@ -310,6 +309,19 @@ void ToProto(const BindingRecord& record, Detail detail, v1::Binding* out) {
 void ToProto(const BindProgress& progress, v1::BindingProgress* out) {
   out->set_points_done(progress.points_done);
   out->set_points_total(progress.points_total);
+}
+
+void ToProto(const BindQuality& quality, v1::BindingQuality* out) {
+  out->set_reproduction_error(quality.reproduction_error);
+  out->set_partition_error(quality.partition_error);
+  out->set_weight_min(quality.weight_min);
+  out->set_weight_max(quality.weight_max);
+  out->set_weight_sum_max(quality.weight_sum_max);
+  out->set_iterations_total(quality.iterations_total);
+  out->set_iterations_max(quality.iterations_max);
+  out->set_iterations_mean(quality.iterations_mean);
+  out->set_residual_max(quality.residual_max);
+  out->set_residual_mean(quality.residual_mean);
 }
 
 void ToProto(const Rig& rig, v1::Rig* out) {

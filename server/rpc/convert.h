@@ -12,6 +12,7 @@
 #include "core/deform/pose.h"
 #include "deform/v1/binding.pb.h"
 #include "deform/v1/model.pb.h"
+#include "deform/v1/quality.pb.h"
 #include "deform/v1/session.pb.h"
 #include "server/models/binding_registry.h"
 #include "server/models/model_registry.h"
@@ -48,6 +49,7 @@ void ToProto(const ModelRecord& record, v1::Model* model);
 enum class Detail { kFull, kSummary };
 void ToProto(const BindingRecord& record, Detail detail, v1::Binding* binding);
 void ToProto(const BindProgress& progress, v1::BindingProgress* out);
+void ToProto(const BindQuality& quality, v1::BindingQuality* out);
 void ToProto(const Rig& rig, v1::Rig* out);
 void ToProto(const SessionState& state, v1::Session* session);
 void ToProto(const CoordinateScheme& scheme, v1::Scheme* out);

@@ -67,7 +67,8 @@ class GrpcServerImpl final : public GrpcServer {
         calls_(rooms.sessions.clock(), options.stall_timeout),
         streams_(rooms.sessions, options.stall_timeout),
         model_service_(calls_, rooms.models),
-        binding_service_(calls_, rooms.bindings, rooms.background),
+        binding_service_(calls_, rooms.bindings, rooms.sessions,
+                         rooms.background),
         session_service_(calls_, rooms.sessions, streams_) {}
 
   ~GrpcServerImpl() override {

@@ -53,6 +53,11 @@ SessionState Session::state() const {
   return StateLocked();
 }
 
+Session::Posed Session::posed() const {
+  MutexLock lock(mutex_);
+  return {binding_id_, pose_};
+}
+
 SessionState Session::StateLocked() const {
   return {.tenant = tenant_,
           .id = id_,

@@ -122,6 +122,13 @@ class Session : public std::enable_shared_from_this<Session> {
   const Binding& binding() const { return deformer_.binding(); }
   SessionState state() const;
 
+  // The pose of the present revision, and the binding it belongs to.
+  struct Posed {
+    std::string binding_id;
+    Pose pose;
+  };
+  Posed posed() const;
+
   struct Joined {
     std::unique_ptr<Participant> participant;
     SessionState state;

@@ -175,7 +175,7 @@ TEST(Bindings, AreThereWhenAskedForAgain) {
   EXPECT_FALSE(first.existed);
   EXPECT_EQ(first.vertex_count, 8);
   EXPECT_EQ(first.normal_count, 12);
-  EXPECT_LT(first.reproduction_error, 1e-6);  // Float weights.
+  EXPECT_LT(first.quality.reproduction_error, 1e-6);  // Float weights.
   const BindingInfo again = server.BindBall();
   EXPECT_TRUE(again.existed);
   EXPECT_EQ(again.binding_id, first.binding_id);

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/error.h"
+
 namespace deform {
 namespace {
 
@@ -107,6 +109,93 @@ TEST(Weights, BytesThatDoNotMakeRowsAreRefused) {
   EXPECT_FALSE(FromProto(response).ok());
   response.set_vertex_count(0);
   EXPECT_FALSE(FromProto(response).ok());
+}
+
+TEST(QualityOfABinding, IsReadFigureByFigure) {
+  v1::BindingQuality message;
+  message.set_reproduction_error(1);
+  message.set_partition_error(2);
+  message.set_weight_min(-3);
+  message.set_weight_max(4);
+  message.set_weight_sum_max(5);
+  message.set_iterations_total(uint64_t{6} << 32);
+  message.set_iterations_max(7);
+  message.set_iterations_mean(8);
+  message.set_residual_max(9);
+  message.set_residual_mean(10);
+  const BindQuality quality = FromProto(message);
+  EXPECT_EQ(quality.reproduction_error, 1);
+  EXPECT_EQ(quality.partition_error, 2);
+  EXPECT_EQ(quality.weight_min, -3);
+  EXPECT_EQ(quality.weight_max, 4);
+  EXPECT_EQ(quality.weight_sum_max, 5);
+  EXPECT_EQ(quality.iterations_total, int64_t{6} << 32);
+  EXPECT_EQ(quality.iterations_max, 7);
+  EXPECT_EQ(quality.iterations_mean, 8);
+  EXPECT_EQ(quality.residual_max, 9);
+  EXPECT_EQ(quality.residual_mean, 10);
+}
+
+TEST(QualityOfAPose, IsReadFigureByFigure) {
+  v1::QualityReport message;
+  message.set_rig_distance_min(0.5);
+  EXPECT_FALSE(FromProto(message).pose.has_value());
+  v1::PoseQuality& pose = *message.mutable_pose();
+  pose.set_point_count(9);
+  pose.set_sampled(true);
+  pose.set_near_rig_count(2);
+  pose.set_fixed_count(3);
+  pose.set_distortion_max(4);
+  pose.set_distortion_p99(5);
+  pose.set_distortion_median(6);
+  pose.add_distortion_edges(1);
+  pose.add_distortion_counts(9);
+  pose.set_fold_over_count(7);
+  pose.set_volume_change_min(-8);
+  pose.set_volume_change_median(8);
+  pose.set_volume_change_max(9);
+  pose.set_volume_kind(v1::VOLUME_KIND_CAPPED);
+  pose.set_volume_rest(10);
+  pose.set_volume_posed(11);
+  const QualityInfo info = FromProto(message);
+  EXPECT_EQ(info.rig_distance_min, 0.5);
+  EXPECT_EQ(info.points_measured, 9);
+  ASSERT_TRUE(info.pose.has_value());
+  EXPECT_TRUE(info.pose->sampled);
+  EXPECT_EQ(info.pose->near_rig, 2);
+  EXPECT_EQ(info.pose->fixed, 3);
+  EXPECT_EQ(info.pose->distortion_max, 4);
+  EXPECT_EQ(info.pose->distortion_p99, 5);
+  EXPECT_EQ(info.pose->distortion_median, 6);
+  EXPECT_EQ(info.pose->most_distorted, -1);
+  EXPECT_EQ(info.pose->distortion.edges, std::vector<double>{1});
+  EXPECT_EQ(info.pose->distortion.counts, std::vector<int64_t>{9});
+  EXPECT_EQ(info.pose->fold_overs, 7);
+  EXPECT_EQ(info.pose->volume_change_min, -8);
+  EXPECT_EQ(info.pose->volume_change_median, 8);
+  EXPECT_EQ(info.pose->volume_change_max, 9);
+  EXPECT_EQ(info.pose->volume_kind, VolumeKind::kCapped);
+  EXPECT_EQ(info.pose->volume_rest, 10);
+  EXPECT_EQ(info.pose->volume_posed, 11);
+  pose.set_most_distorted_point(5);
+  EXPECT_EQ(FromProto(message).pose->most_distorted, 5);
+}
+
+TEST(QualityOfAPose, IsRefusedIfItsPointsDoNotFit) {
+  v1::QualityPoints points;
+  points.add_points(3);
+  points.add_distortion(1.5);
+  QualityInfo info;
+  info.pose.emplace();
+  EXPECT_EQ(DetailOf(AddPoints(points, info)).reason, "BAD_ANSWER");
+  points.add_volume_change(2);
+  ASSERT_TRUE(AddPoints(points, info).ok());
+  ASSERT_EQ(info.pose->points.size(), 1u);
+  EXPECT_EQ(info.pose->points[0].point, 3);
+  EXPECT_EQ(info.pose->points[0].distortion, 1.5);
+  EXPECT_EQ(info.pose->points[0].volume_change, 2);
+  info.pose.reset();
+  EXPECT_EQ(DetailOf(AddPoints(points, info)).reason, "BAD_ANSWER");
 }
 
 TEST(RigOfABinding, IsReadBackAsItWasSent) {

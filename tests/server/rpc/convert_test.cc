@@ -246,6 +246,31 @@ TEST(ConvertRig, ComesBackAsItWas) {
   EXPECT_EQ(rig.SerializeAsString(), GoodRequest().rig().SerializeAsString());
 }
 
+TEST(ConvertBindQuality, TellsEveryFigure) {
+  v1::BindingQuality out;
+  ToProto({.reproduction_error = 1,
+           .partition_error = 2,
+           .weight_min = -3,
+           .weight_max = 4,
+           .weight_sum_max = 5,
+           .iterations_total = int64_t{6} << 32,
+           .iterations_max = 7,
+           .iterations_mean = 8,
+           .residual_max = 9,
+           .residual_mean = 10},
+          &out);
+  EXPECT_EQ(out.reproduction_error(), 1);
+  EXPECT_EQ(out.partition_error(), 2);
+  EXPECT_EQ(out.weight_min(), -3);
+  EXPECT_EQ(out.weight_max(), 4);
+  EXPECT_EQ(out.weight_sum_max(), 5);
+  EXPECT_EQ(out.iterations_total(), uint64_t{6} << 32);
+  EXPECT_EQ(out.iterations_max(), 7u);
+  EXPECT_EQ(out.iterations_mean(), 8);
+  EXPECT_EQ(out.residual_max(), 9);
+  EXPECT_EQ(out.residual_mean(), 10);
+}
+
 class ConvertBindingRecord : public testing::Test {
  protected:
   BindingRecord RecordOf(const BindRequest& request) {

@@ -10,7 +10,10 @@
   X(Show)                  \
   X(Delete)                \
   X(Weights)               \
+  X(Report)                \
+  X(Compare)               \
   X(Cage)                  \
+  X(Generate)              \
   X(Picture)               \
   X(Verify)                \
   X(Completion)            \

@@ -1,6 +1,7 @@
 #include "client/cli/picture_options.h"
 
 #include <CLI/CLI.hpp>
+#include <utility>
 
 #include "client/cli/exit_code.h"
 #include "core/base/status_macros.h"
@@ -27,8 +28,8 @@ void PictureOptions::AddTo(CLI::App& app) {
   group->add_flag("--no-rig", no_rig, "Leave the cage or handles out");
 }
 
-absl::Status DrawInto(const std::string& path, const PictureOptions& options,
-                      Picture picture) {
+absl::StatusOr<Image> DrawImage(const PictureOptions& options,
+                                Picture picture) {
   const View::Up up = options.up == "x"   ? View::Up::kX
                       : options.up == "z" ? View::Up::kZ
                                           : View::Up::kY;
@@ -40,10 +41,21 @@ absl::Status DrawInto(const std::string& path, const PictureOptions& options,
   if (options.no_rig) {
     for (PicturePanel& panel : picture.panels) panel.rig.resize(0, 3);
   }
-  const absl::StatusOr<Image> image = DrawPicture(picture);
+  absl::StatusOr<Image> image = DrawPicture(picture);
   if (!image.ok()) return WithExit(kBadFile, image.status());
-  const absl::Status written = WritePng(*image, path);
+  return image;
+}
+
+absl::Status SavePng(const Image& image, const std::string& path) {
+  const absl::Status written = WritePng(image, path);
   return written.ok() ? written : WithExit(kBadFile, written);
+}
+
+absl::Status DrawInto(const std::string& path, const PictureOptions& options,
+                      Picture picture) {
+  DEFORM_ASSIGN_OR_RETURN(const Image image,
+                          DrawImage(options, std::move(picture)));
+  return SavePng(image, path);
 }
 
 }  // namespace deform::cli

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "client/pictures/picture.h"
 
 namespace CLI {
@@ -22,7 +23,12 @@ struct PictureOptions {
   void AddTo(CLI::App& app);
 };
 
-// Draws `picture`, as the options say, into a PNG file.
+// Draws `picture` as the options say.
+absl::StatusOr<Image> DrawImage(const PictureOptions& options, Picture picture);
+
+absl::Status SavePng(const Image& image, const std::string& path);
+
+// Both.
 absl::Status DrawInto(const std::string& path, const PictureOptions& options,
                       Picture picture);
 

@@ -46,7 +46,7 @@ absl::StatusOr<std::vector<double>> ParseWeights(const std::string& text) {
 
 }  // namespace
 
-void RigOptions::AddTo(CLI::App& app) {
+void RigOptions::AddTo(CLI::App& app, bool both) {
   auto* const group = app.add_option_group("Rig", "What the model hangs on");
   auto* const cage_option =
       group
@@ -54,9 +54,12 @@ void RigOptions::AddTo(CLI::App& app) {
                        "Closed mesh around the model; in 2D loops of OBJ 'l' "
                        "elements")
           ->type_name("FILE");
-  group->add_option("--handles", handles, "Control points: a file's vertices")
-      ->type_name("FILE")
-      ->excludes(cage_option);
+  auto* const handles_option =
+      group
+          ->add_option("--handles", handles,
+                       "Control points: a file's vertices")
+          ->type_name("FILE");
+  if (!both) handles_option->excludes(cage_option);
   group
       ->add_option("--scheme", scheme,
                    "Coordinate scheme, see 'list schemes'; by default green "

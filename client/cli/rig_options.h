@@ -24,7 +24,8 @@ struct RigOptions {
   double lambda = 0;
   int dimension = 0;  // 0: as the files say.
 
-  void AddTo(CLI::App& app);
+  // `both`: a cage and handles may be given together.
+  void AddTo(CLI::App& app, bool both = false);
   // Whether any rig was given.
   bool given() const { return !cage.empty() || !handles.empty(); }
 };

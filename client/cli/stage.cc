@@ -101,6 +101,48 @@ Stage::~Stage() {
   Close().IgnoreError();
 }
 
+absl::StatusOr<Frame> Stage::DeformOnce(const PoseUpdate& pose) {
+  DEFORM_ASSIGN_OR_RETURN(
+      DeformStream stream,
+      client_.Deform(session_.session_id, Delivery::kEvery));
+  DEFORM_ASSIGN_OR_RETURN(const uint64_t sequence, stream.Send(pose));
+  Frame frame;
+  do {
+    DEFORM_RETURN_IF_ERROR(stream.NextFrame(frame));
+  } while (frame.answers_sequence < sequence);
+  return frame;
+}
+
+absl::StatusOr<std::vector<double>> Stage::InfluenceOfVertex(int64_t vertex) {
+  if (vertex < binding_.vertex_count) return WeightColumn(vertex);
+  return UsageError(absl::StrCat("--handle ", vertex, ": the rig has ",
+                                 binding_.vertex_count, " vertices"));
+}
+
+absl::StatusOr<std::vector<double>> Stage::InfluenceOfFace(int64_t face) {
+  if (face < binding_.normal_count) {
+    return WeightColumn(binding_.vertex_count + face);
+  }
+  return UsageError(absl::StrCat("--face ", face, ": scheme ", binding_.scheme,
+                                 " has weights of ", binding_.normal_count,
+                                 " normals"));
+}
+
+absl::StatusOr<std::vector<double>> Stage::WeightColumn(int64_t column) {
+  std::vector<double> values(binding_.point_count);
+  DEFORM_RETURN_IF_ERROR(client_.GetWeights(
+      binding_.binding_id, WeightPrecision::kCachedFloat32, 0, 0,
+      [&](const WeightRows& rows) {
+        const int64_t normal = column - rows.vertex.cols();
+        for (int64_t i = 0; i < rows.vertex.rows(); ++i) {
+          values.at(rows.first_point + i) =
+              normal < 0 ? rows.vertex(i, column) : rows.normal(i, normal);
+        }
+        return absl::OkStatus();
+      }));
+  return values;
+}
+
 absl::StatusOr<Positions> Stage::LoadPose(const std::string& path) const {
   DEFORM_ASSIGN_OR_RETURN(const MeshFile file,
                           LoadMesh(path, ToFileDimension(rig_.dimension)));

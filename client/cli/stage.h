@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "client/cli/command.h"
@@ -39,6 +40,14 @@ class Stage {
   // The model's file, if one was given.
   const std::optional<MeshFile>& model() const { return model_; }
 
+  // The frame of one pose of the session.
+  absl::StatusOr<Frame> DeformOnce(const PoseUpdate& pose);
+
+  // At every point the weight of a vertex of the rig, or of the normal of a
+  // face. A usage error if there is none.
+  absl::StatusOr<std::vector<double>> InfluenceOfVertex(int64_t vertex);
+  absl::StatusOr<std::vector<double>> InfluenceOfFace(int64_t face);
+
   // The posed rig that a file holds.
   absl::StatusOr<Positions> LoadPose(const std::string& path) const;
 
@@ -53,6 +62,9 @@ class Stage {
   absl::Status Close();
 
  private:
+  // Of the vertex weights followed by the normal weights.
+  absl::StatusOr<std::vector<double>> WeightColumn(int64_t column);
+
   explicit Stage(Client client) : client_(std::move(client)) {}
   absl::Status Bind(Context& context, const StageOptions& options);
   absl::Status UseBinding(const StageOptions& options);

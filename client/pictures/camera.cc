@@ -76,8 +76,9 @@ absl::StatusOr<View> ParseView(absl::string_view text, View::Up up) {
 }
 
 Camera Camera::Fit(const std::vector<PositionsRef>& points, const View& view,
-                   int width, int height, double margin) {
+                   int width, int height, double margin, double header) {
   Camera camera;
+  const double top = std::min(header, 0.5 * height);
   const Eigen::Matrix3d front = FrontFrame(view.up);
   const Box box = BoxOfAll(points);
   double azimuth = view.azimuth;
@@ -96,9 +97,9 @@ Camera Camera::Fit(const std::vector<PositionsRef>& points, const View& view,
   camera.axes_ = axes * front.transpose();
   camera.target_ = box.center();
   camera.center_x_ = 0.5 * width;
-  camera.center_y_ = 0.5 * height;
+  camera.center_y_ = 0.5 * (height + top);
   camera.scale_ = 0.5 * height / std::tan(kHalfAngle);
-  camera.Frame(points, (0.5 - margin) * width, (0.5 - margin) * height);
+  camera.Frame(points, (0.5 - margin) * width, (0.5 - margin) * (height - top));
   return camera;
 }
 
@@ -139,18 +140,19 @@ void Camera::Frame(const std::vector<PositionsRef>& points, double half_width,
 }
 
 Camera Camera::Flat(const std::vector<PositionsRef>& points, int width,
-                    int height, double margin) {
+                    int height, double margin, double header) {
   Camera camera;
+  const double top = std::min(header, 0.5 * height);
   const Box box = BoxOfAll(points);
   const Vec3 size = box.max - box.min;
   const double tiny = std::max(1e-9 * size.norm(), 1e-300);
   camera.flat_ = true;
   camera.target_ = box.center();
   camera.center_x_ = 0.5 * width;
-  camera.center_y_ = 0.5 * height;
+  camera.center_y_ = 0.5 * (height + top);
   camera.scale_ =
       (1 - 2 * margin) * std::min(width / std::max(size.x(), tiny),
-                                  height / std::max(size.y(), tiny));
+                                  (height - top) / std::max(size.y(), tiny));
   return camera;
 }
 

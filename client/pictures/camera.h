@@ -37,12 +37,13 @@ struct Projected {
 class Camera {
  public:
   // Fits `points` (finite, at least one) into width x height pixels with a
-  // margin, in perspective, as `view` says.
+  // margin, in perspective, as `view` says. The uppermost `header` pixels stay
+  // free, as far as they leave half of the height.
   static Camera Fit(const std::vector<PositionsRef>& points, const View& view,
-                    int width, int height, double margin);
+                    int width, int height, double margin, double header = 0);
   // Looks down on the plane z = 0, without perspective, x to the right.
   static Camera Flat(const std::vector<PositionsRef>& points, int width,
-                     int height, double margin);
+                     int height, double margin, double header = 0);
 
   Projected Project(const Vec3& point) const;
   // From a point of the scene to the eye.

@@ -1,16 +1,14 @@
 #include "client/pictures/picture.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "client/pictures/canvas.h"
-#include "client/pictures/font.h"
-#include "client/pictures/normals.h"
+#include "client/pictures/model_drawing.h"
+#include "client/pictures/text.h"
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
 #include "core/mesh/mesh.h"
@@ -20,16 +18,10 @@ namespace {
 
 const Light kGroundTop(0.985f, 0.985f, 0.98f);
 const Light kGroundBottom(0.90f, 0.915f, 0.93f);
-const Light kModel(0.86f, 0.60f, 0.44f);
-const Light kModelInside(0.45f, 0.50f, 0.58f);
-const Light kTileA(0.93f, 0.74f, 0.58f);
-const Light kTileB(0.86f, 0.60f, 0.44f);
 const Light kRig(0.10f, 0.27f, 0.46f);
 const Light kText(0.22f, 0.25f, 0.29f);
-const Light kOutline(0.42f, 0.26f, 0.17f);
 
 constexpr double kMargin = 0.06;
-constexpr double kCreaseDegrees = 50;
 
 template <typename... Parts>
 absl::Status BadPicture(const Parts&... parts) {
@@ -55,12 +47,22 @@ absl::Status CheckPicture(const Picture& picture) {
     DEFORM_RETURN_IF_ERROR(
         CheckPositions(panel.positions, "vertex", "picture"));
     DEFORM_RETURN_IF_ERROR(CheckPositions(panel.rig, "rig vertex", "picture"));
-    if (panel.rig.rows() > 0) {
+    if (!panel.values.empty() &&
+        std::ssize(panel.values) != first.positions.rows()) {
+      return BadPicture("a panel has ", panel.values.size(), " values for ",
+                        first.positions.rows(), " points");
+    }
+    if (panel.rig.rows() > 0 && !panel.rig_is_handles) {
       DEFORM_RETURN_IF_ERROR(
           CheckIndices(picture.rig_faces, panel.rig.rows(), "picture"));
     }
   }
   return CheckIndices(picture.faces, first.positions.rows(), "picture");
+}
+
+// One of a picture of the usual size.
+double PixelOf(const Picture& picture) {
+  return std::min(picture.width, picture.height) / 900.0;
 }
 
 std::set<std::pair<int32_t, int32_t>> EdgesOf(const Faces& faces) {
@@ -72,117 +74,6 @@ std::set<std::pair<int32_t, int32_t>> EdgesOf(const Faces& faces) {
     }
   }
   return edges;
-}
-
-// Light on a surface, in the camera's frame: a key light from above left, a
-// weak one from the right, sky from above and a soft highlight.
-class Lamp {
- public:
-  explicit Lamp(const Camera& camera)
-      : axes_(camera.axes()),
-        key_(Vec3(-0.42, 0.48, 0.77).normalized()),
-        fill_(Vec3(0.8, 0.05, 0.5).normalized()) {}
-
-  Light Shade(const Light& color, const Light& inside, const Vec3& world_normal,
-              const Vec3& world_to_eye, bool back) const {
-    const Vec3 n = axes_ * (back ? Vec3(-world_normal) : world_normal);
-    const Vec3 eye = axes_ * world_to_eye;
-    const double key = std::max(0.0, n.dot(key_));
-    const double fill = std::max(0.0, n.dot(fill_));
-    const double sky = 0.5 + 0.5 * n.y();
-    const double rim = std::pow(1 - std::clamp(n.dot(eye), 0.0, 1.0), 3);
-    const double shine =
-        std::pow(std::max(0.0, n.dot((key_ + eye).normalized())), 40);
-    const double diffuse = 0.33 + 0.13 * sky + 0.56 * key + 0.22 * fill;
-    const double white = 0.16 * shine + 0.10 * rim * sky;
-    return static_cast<float>(diffuse) * (back ? inside : color) +
-           Light::Constant(static_cast<float>(white));
-  }
-
- private:
-  Eigen::Matrix3d axes_;
-  Vec3 key_;
-  Vec3 fill_;
-};
-
-std::vector<Projected> ProjectAll(const Camera& camera,
-                                  const Positions& positions) {
-  std::vector<Projected> projected(positions.rows());
-  for (int64_t i = 0; i < positions.rows(); ++i) {
-    projected[i] = camera.Project(positions.row(i));
-  }
-  return projected;
-}
-
-void DrawShaded(const Positions& positions, const Faces& faces,
-                const Camera& camera, Canvas& canvas) {
-  const std::vector<Projected> projected = ProjectAll(camera, positions);
-  const Positions normals = CornerNormals(positions, faces, kCreaseDegrees);
-  const Lamp lamp(camera);
-  for (int64_t f = 0; f < faces.rows(); ++f) {
-    const Projected corners[3] = {
-        projected[faces(f, 0)], projected[faces(f, 1)], projected[faces(f, 2)]};
-    const Eigen::Matrix3d n = normals.middleRows<3>(3 * f).transpose();
-    const Vec3 a = positions.row(faces(f, 0));
-    const Vec3 to_eye = camera.ToEye(a);
-    // Of the face itself: near its outline a smooth normal may turn away.
-    const Vec3 b = positions.row(faces(f, 1));
-    const Vec3 c = positions.row(faces(f, 2));
-    const bool back = (b - a).cross(c - a).dot(to_eye) < 0;
-    canvas.Triangle(corners, [&](const Eigen::Vector3f& place) {
-      const Vec3 normal = (n * place.cast<double>()).normalized();
-      return lamp.Shade(kModel, kModelInside, normal, to_eye, back);
-    });
-  }
-  canvas.ShadeGrooves(0.018 * canvas.width(), 0.5f);
-}
-
-// Tiles of the size of a 16th of the rest model, by where a sample was at rest.
-void DrawChequered(const Positions& positions, const Positions& rest,
-                   const Faces& faces, const Camera& camera, Canvas& canvas) {
-  const std::vector<Projected> projected = ProjectAll(camera, positions);
-  const Box box = BoxOf(rest);
-  const double tile = std::max((box.max - box.min).maxCoeff() / 16, 1e-300);
-  for (int64_t f = 0; f < faces.rows(); ++f) {
-    const Projected corners[3] = {
-        projected[faces(f, 0)], projected[faces(f, 1)], projected[faces(f, 2)]};
-    Eigen::Matrix3d at;
-    for (int k = 0; k < 3; ++k) {
-      at.col(k) = (rest.row(faces(f, k)).transpose() - box.min) / tile;
-    }
-    canvas.Triangle(corners, [&](const Eigen::Vector3f& place) {
-      const Vec3 where = at * place.cast<double>();
-      const auto sum = static_cast<int64_t>(std::floor(where.x() + 1e-9) +
-                                            std::floor(where.y() + 1e-9));
-      return sum % 2 == 0 ? kTileA : kTileB;
-    });
-  }
-}
-
-// The outline of a flat model: edges of one triangle only.
-void DrawOutline(const Positions& positions, const Faces& faces,
-                 const Camera& camera, double width, Canvas& canvas) {
-  std::multiset<std::pair<int32_t, int32_t>> edges;
-  for (int64_t f = 0; f < faces.rows(); ++f) {
-    for (int k = 0; k < 3; ++k) {
-      edges.insert(std::minmax(faces(f, k), faces(f, (k + 1) % 3)));
-    }
-  }
-  for (const auto& [a, b] : edges) {
-    if (edges.count({a, b}) != 1) continue;
-    canvas.Line(camera.Project(positions.row(a)),
-                camera.Project(positions.row(b)), width, 0.9f, 0.9f, 0);
-  }
-  canvas.FlushLines(kOutline);
-}
-
-void DrawPoints(const Positions& positions, const Camera& camera, double width,
-                const Light& color, float hidden, Canvas& canvas) {
-  for (int64_t i = 0; i < positions.rows(); ++i) {
-    const Projected at = camera.Project(positions.row(i));
-    canvas.Line(at, at, width, 1, hidden, 0);
-  }
-  canvas.FlushLines(color);
 }
 
 void DrawRig(const Positions& rig, const Faces& faces, const Camera& camera,
@@ -199,34 +90,48 @@ void DrawRig(const Positions& rig, const Faces& faces, const Camera& camera,
   canvas.FlushLines(kRig);
 }
 
+// Small pictures keep letters that can be read.
+double CaptionSize(double pixel) { return std::max(0.95 * pixel, 0.75); }
+
 void DrawCaption(absl::string_view caption, double pixel, Canvas& canvas) {
-  const double dot = 1.9 * pixel;
-  const double left = 16 * pixel;
-  const double top = 16 * pixel;
-  for (const Stroke& stroke : TextStrokes(caption)) {
-    canvas.Line({left + dot * stroke.x0, top + dot * stroke.y0, 1},
-                {left + dot * stroke.x1, top + dot * stroke.y1, 1}, 1.05 * dot,
-                1, 1, 0);
-  }
+  DrawText(caption, 16 * pixel, 16 * pixel, CaptionSize(pixel), Align::kLeft,
+           canvas);
   canvas.FlushLines(kText);
+}
+
+// What the longest caption takes beyond its first line, which fits the margin.
+double HeaderOf(const Picture& picture) {
+  int64_t lines = 1;
+  for (const PicturePanel& panel : picture.panels) {
+    lines = std::max<int64_t>(lines, 1 + std::count(panel.caption.begin(),
+                                                    panel.caption.end(), '\n'));
+  }
+  return static_cast<double>(lines - 1) * kTextLine *
+         CaptionSize(PixelOf(picture));
 }
 
 Image DrawPanel(const Picture& picture, const PicturePanel& panel,
                 const Camera& camera) {
   Canvas canvas(picture.width, picture.height);
   canvas.FillBackground(kGroundTop, kGroundBottom);
-  const double pixel = std::min(picture.width, picture.height) / 900.0;
+  const double pixel = PixelOf(picture);
   const Positions& rest = picture.panels.front().positions;
+  const Paint paint(picture.scale, panel.values);
   if (picture.faces.rows() == 0) {
-    DrawPoints(panel.positions, camera, 3.5 * pixel, kModel, 0.6f, canvas);
+    DrawPoints(panel.positions, paint, camera, 4 * pixel, canvas);
   } else if (picture.dimension == 2) {
-    DrawChequered(panel.positions, rest, picture.faces, camera, canvas);
+    if (paint.empty()) {
+      DrawChequered(panel.positions, rest, picture.faces, camera, canvas);
+    } else {
+      DrawBands(panel.positions, picture.faces, paint, camera, canvas);
+    }
     DrawOutline(panel.positions, picture.faces, camera, 1.5 * pixel, canvas);
   } else {
-    DrawShaded(panel.positions, picture.faces, camera, canvas);
+    DrawShaded(panel.positions, picture.faces, paint, camera, canvas);
   }
   if (panel.rig.rows() > 0) {
-    DrawRig(panel.rig, picture.rig_faces, camera, pixel, canvas);
+    DrawRig(panel.rig, panel.rig_is_handles ? Faces() : picture.rig_faces,
+            camera, pixel, canvas);
   }
   DrawCaption(panel.caption, pixel, canvas);
   return canvas.Resolve();
@@ -239,13 +144,17 @@ absl::StatusOr<Image> DrawPicture(const Picture& picture) {
   std::vector<PositionsRef> seen;
   for (const PicturePanel& panel : picture.panels) {
     seen.emplace_back(panel.positions);
-    if (panel.rig.rows() > 0) seen.emplace_back(panel.rig);
+    // Handles may lie anywhere; a cage is around the model.
+    if (panel.rig.rows() > 0 && !panel.rig_is_handles) {
+      seen.emplace_back(panel.rig);
+    }
   }
+  const double header = HeaderOf(picture);
   const Camera camera =
       picture.dimension == 2
-          ? Camera::Flat(seen, picture.width, picture.height, kMargin)
+          ? Camera::Flat(seen, picture.width, picture.height, kMargin, header)
           : Camera::Fit(seen, picture.view, picture.width, picture.height,
-                        kMargin);
+                        kMargin, header);
   const int count = static_cast<int>(picture.panels.size());
   Image image{picture.width * count, picture.height, {}};
   image.pixels.resize(static_cast<size_t>(image.width) * image.height);

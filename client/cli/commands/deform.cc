@@ -32,18 +32,6 @@ absl::StatusOr<Positions> PoseOf(const Options& options, const Stage& stage) {
                       stage.rig().dimension, options.at);
 }
 
-absl::StatusOr<Frame> DeformOnce(Stage& stage, const PoseUpdate& pose) {
-  DEFORM_ASSIGN_OR_RETURN(
-      DeformStream stream,
-      stage.client().Deform(stage.session().session_id, Delivery::kEvery));
-  DEFORM_ASSIGN_OR_RETURN(const uint64_t sequence, stream.Send(pose));
-  Frame frame;
-  do {
-    DEFORM_RETURN_IF_ERROR(stream.NextFrame(frame));
-  } while (frame.answers_sequence < sequence);
-  return frame;
-}
-
 absl::Status Draw(const Options& options, const Stage& stage,
                   const Positions& pose, const Positions& deformed) {
   const MeshFile& model = *stage.model();
@@ -101,7 +89,7 @@ absl::Status Run(const Options& options, Context& context) {
   DEFORM_ASSIGN_OR_RETURN(const Positions pose, PoseOf(options, *stage));
   DEFORM_ASSIGN_OR_RETURN(
       const Frame frame,
-      DeformOnce(*stage, {.positions = pose, .stretch_blend = options.blend}));
+      stage->DeformOnce({.positions = pose, .stretch_blend = options.blend}));
   const Positions deformed = frame.DoublePositions();
   if (!options.out.empty()) {
     DEFORM_ASSIGN_OR_RETURN(const std::string bytes,
@@ -121,8 +109,8 @@ Action Setup(CLI::App& app) {
                  "Posed cage or handles: a file with the rig's vertices, moved")
       ->type_name("FILE");
   app.add_option("--motion", options->motion,
-                 "Instead of a file: twist, bend, stretch or pulse the rig")
-      ->check(CLI::IsMember({"twist", "bend", "stretch", "pulse"}));
+                 absl::StrCat("Instead of a file: ", MotionList()))
+      ->check(CLI::IsMember(MotionNames()));
   app.add_option("--at", options->at,
                  "Time of the motion; it begins and ends at rest, at 0 and 1")
       ->check(CLI::Range(0.0, 1.0))

@@ -178,8 +178,8 @@ Action Setup(CLI::App& app) {
   app.add_option("poses", options->poses, "Posed cages or handles, in order")
       ->type_name("FILE");
   app.add_option("--motion", options->motion,
-                 "Instead of files: twist, bend, stretch or pulse the rig")
-      ->check(CLI::IsMember({"twist", "bend", "stretch", "pulse"}));
+                 absl::StrCat("Instead of files: ", MotionList()))
+      ->check(CLI::IsMember(MotionNames()));
   app.add_option("--frames", options->frames, "Poses of the motion")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();

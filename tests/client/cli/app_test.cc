@@ -124,7 +124,7 @@ INSTANTIATE_TEST_SUITE_P(
          "give pose files"},
         {"PlayMotion",
          {"play", "--motion", "jump"},
-         "jump not in {twist,bend,stretch,pulse}"},
+         "jump not in {twist,bend,stretch,pulse,beat,wave}"},
         {"PlayInFlight",
          {"play", "--motion", "bend", "--in-flight", "0"},
          "--in-flight: Value 0 not in range"},
@@ -143,6 +143,50 @@ INSTANTIATE_TEST_SUITE_P(
          {"weights", "b", "--format", "binary"},
          "--format binary needs --out"},
         {"WeightsFirst", {"weights", "b", "--first", "-1"}, "--first"},
+        {"ReportNothing", {"report"}, "say what is to be deformed"},
+        {"ReportPngWithoutModel",
+         {"report", "--binding", "b", "--motion", "bend", "--png", "p"},
+         "--png needs --model-file"},
+        {"ReportPngWithoutPose",
+         {"report", "--binding", "b", "--model-file", "m", "--png", "p"},
+         "--color distortion needs a pose: --pose, --motion or --session"},
+        {"ReportTwoPoses",
+         {"report", "--binding", "b", "--pose", "p", "--session", "s"},
+         "excludes"},
+        {"ReportColor",
+         {"report", "--binding", "b", "--color", "mood"},
+         "mood not in {distortion,volume,displacement,influence}"},
+        {"ReportMaxPoints",
+         {"report", "--binding", "b", "--max-points", "1000001"},
+         "1000001 not in range"},
+        {"ReportHandleAndFace",
+         {"report", "--binding", "b", "--handle", "1", "--face", "1"},
+         "excludes"},
+        {"CompareNothing",
+         {"compare", "--model-file", "m", "--motion", "bend"},
+         "--cage FILE, --handles FILE, or both"},
+        {"CompareWithoutPose",
+         {"compare", "--model-file", "m", "--cage", "c"},
+         "give the posed rigs, --cage-pose and --handles-pose"},
+        {"CompareOnePoseOfTwo",
+         {"compare", "--model-file", "m", "--cage", "c", "--handles", "h",
+          "--cage-pose", "p"},
+         "each rig needs its pose"},
+        {"CompareMotionAndPose",
+         {"compare", "--model-file", "m", "--cage", "c", "--cage-pose", "p",
+          "--motion", "bend"},
+         "excludes"},
+        {"CompareWithoutModel", {"compare"}, "--model-file is required"},
+        {"GenerateNothing", {"generate"}, "shape is required"},
+        {"GenerateUnknown",
+         {"generate", "cube", "--out", "x"},
+         "cube not in {organ,bar,torus,plate,angle}"},
+        {"GeneratePoints",
+         {"generate", "bar", "--out", "x", "--points", "99"},
+         "99 not in range"},
+        {"GenerateCageOfOrgan",
+         {"generate", "organ", "--out", "x", "--cage", "c"},
+         "organ comes without a cage"},
         {"CageWithoutOut", {"cage", "a.obj"}, "--out is required"},
         {"CageFaces",
          {"cage", "a.obj", "--out", "b", "--faces", "7"},
@@ -242,6 +286,33 @@ TEST(Cage, SaysWhyThereIsNone) {
   EXPECT_THAT(point.err, HasSubstr("point.obj: "));
 }
 
+TEST(Generate, WritesModelAndRigsWithoutAServer) {
+  const std::string folder = testing::TempDir() + "/";
+  const CliResult result =
+      RunCli({"generate", "bar", "--points", "300", "--out", folder + "bar.obj",
+              "--cage", folder + "bar_cage.obj", "--handles",
+              folder + "bar_handles.obj", "--json"});
+  EXPECT_EQ(result.exit_code, kOk) << result.out;
+  const MeshFile model = ReadMeshFile(folder + "bar.obj").value();
+  EXPECT_EQ(result.json()["point_count"], model.positions.rows());
+  const MeshFile cage = ReadMeshFile(folder + "bar_cage.obj").value();
+  EXPECT_EQ(cage.positions.rows(), 20);
+  EXPECT_TRUE(Cage::Create(3, cage.positions, cage.faces).ok());
+  EXPECT_EQ(ReadMeshFile(folder + "bar_handles.obj")->positions,
+            cage.positions);
+}
+
+TEST(Generate, WritesLoopsIn2D) {
+  const std::string folder = testing::TempDir() + "/";
+  EXPECT_EQ(RunCli({"generate", "angle", "--out", folder + "angle.obj",
+                    "--cage", folder + "angle_cage.obj"})
+                .exit_code,
+            kOk);
+  const MeshFile cage = ReadMeshFile(folder + "angle_cage.obj").value();
+  EXPECT_EQ(cage.dimension, 2);
+  EXPECT_EQ(cage.edges.rows(), 12);
+}
+
 TEST(Picture, IsDrawnWithoutAServer) {
   const std::string path = testing::TempDir() + "/cube.png";
   const CliResult result =
@@ -307,7 +378,7 @@ TEST(Completion, WorksInBash) {
     pclose(pipe);
     return answer;
   };
-  EXPECT_EQ(complete("deformctl re", 1), "register\n");
+  EXPECT_EQ(complete("deformctl re", 1), "register report\n");
   EXPECT_EQ(complete("deformctl --json list mo", 3), "models\n");
   EXPECT_EQ(complete("deformctl bind m --flip", 3), "--flip-cage\n");
   EXPECT_EQ(complete("deformctl bind m --serv", 3), "--server\n");

@@ -16,15 +16,46 @@ Positions Bar() {
   return corners;
 }
 
+// With a handle off the axis, in the middle.
+Positions BarWithHandle() {
+  Positions handles(9, 3);
+  handles << Bar(), 5.8, 0.5, 1.9;
+  return handles;
+}
+
 TEST(Motion, BeginsAndEndsAtRestAndMovesBetween) {
-  for (const char* name : MotionNames()) {
+  for (const std::string& name : MotionNames()) {
+    const Positions rest = BarWithHandle();
     for (const double time : {0.0, 1.0}) {
-      const Positions pose = PoseOfMotion(name, Bar(), 3, time).value();
-      EXPECT_LT((pose - Bar()).cwiseAbs().maxCoeff(), 1e-9) << name;
+      const Positions pose = PoseOfMotion(name, rest, 3, time).value();
+      EXPECT_LT((pose - rest).cwiseAbs().maxCoeff(), 1e-9) << name;
     }
-    const Positions pose = PoseOfMotion(name, Bar(), 3, 0.25).value();
-    EXPECT_GT((pose - Bar()).cwiseAbs().maxCoeff(), 0.05) << name;
+    const Positions pose = PoseOfMotion(name, rest, 3, 0.4).value();
+    EXPECT_GT((pose - rest).cwiseAbs().maxCoeff(), 0.02) << name;
     EXPECT_TRUE(pose.allFinite()) << name;
+  }
+}
+
+TEST(Motion, AnOrganMovesWithinAFixedBox) {
+  for (const char* name : {"beat", "wave"}) {
+    for (double time = 0; time < 1; time += 0.1) {
+      const Positions pose =
+          PoseOfMotion(name, BarWithHandle(), 3, time).value();
+      EXPECT_EQ(pose.topRows(8), Bar()) << name;
+    }
+  }
+}
+
+TEST(Motion, AWaveContractsOnePlaceAfterTheOther) {
+  Positions handles(11, 3);
+  handles << Bar(), 5.8, 0.5, 1, 5.8, 0.5, 2, 5.8, 0.5, 3;
+  int before = -1;
+  for (const double time : {0.36, 0.5, 0.64}) {
+    const Positions pose = PoseOfMotion("wave", handles, 3, time).value();
+    Eigen::Index most = 0;
+    pose.bottomRows(3).col(0).minCoeff(&most);
+    EXPECT_GT(most, before);
+    before = static_cast<int>(most);
   }
 }
 
@@ -38,10 +69,10 @@ TEST(Motion, TwistTurnsTheEndsAgainstEachOther) {
 }
 
 TEST(Motion, AFlatRigStaysFlat) {
-  Positions square(4, 3);
-  square << 0, 0, 0, 3, 0, 0, 3, 1, 0, 0, 1, 0;
-  for (const char* name : {"bend", "stretch", "pulse"}) {
-    const Positions pose = PoseOfMotion(name, square, 2, 0.2).value();
+  Positions square(5, 3);
+  square << 0, 0, 0, 3, 0, 0, 3, 1, 0, 0, 1, 0, 0.8, 0.9, 0;
+  for (const char* name : {"bend", "stretch", "pulse", "beat", "wave"}) {
+    const Positions pose = PoseOfMotion(name, square, 2, 0.3).value();
     EXPECT_TRUE((pose.col(2).array() == 0).all()) << name;
     EXPECT_GT((pose - square).cwiseAbs().maxCoeff(), 0.01) << name;
   }
@@ -52,12 +83,12 @@ TEST(Motion, AFlatRigStaysFlat) {
 
 TEST(Motion, KnowsWhichThereAre) {
   EXPECT_THAT(std::string(PoseOfMotion("jump", Bar(), 3, 0).status().message()),
-              HasSubstr("'jump': twist, bend, stretch or pulse"));
+              HasSubstr("'jump': twist, bend, stretch, pulse, beat or wave"));
 }
 
 TEST(Motion, APointStays) {
   const Positions point = Positions::Constant(1, 3, 2.0);
-  for (const char* name : MotionNames()) {
+  for (const std::string& name : MotionNames()) {
     EXPECT_TRUE(PoseOfMotion(name, point, 3, 0.3)->allFinite()) << name;
   }
 }

@@ -171,6 +171,57 @@ TEST(Picture, SurvivesCollapsedAndHugeModels) {
   EXPECT_TRUE(IsModel(DrawPicture(picture).value().at(60, 60)));
 }
 
+// Yellow is the upper end of the scale.
+bool IsHigh(Color c) { return c.r > c.b + 60 && c.g > c.b + 60; }
+// Violet the lower.
+bool IsLow(Color c) { return c.b > c.g + 20 && c.r < 120 && c.g < 60; }
+
+TEST(Picture, ColoursAModelByItsValues) {
+  Picture picture = CubePicture();
+  picture.view = ParseView("front", View::Up::kY).value();
+  for (int i = 0; i < 8; ++i) {
+    picture.panels[0].values.push_back(i & 1);  // From left to right.
+  }
+  const Image image = DrawPicture(picture).value();
+  EXPECT_TRUE(IsLow(image.at(12, 60)));
+  EXPECT_TRUE(IsHigh(image.at(108, 60)));
+  EXPECT_FALSE(IsLow(image.at(60, 60)));
+  EXPECT_FALSE(IsHigh(image.at(60, 60)));
+}
+
+TEST(Picture, ShowsValuesOfPointsAndOfFlatModelsToo) {
+  for (const int dimension : {2, 3}) {
+    Picture picture = CubePicture();
+    picture.dimension = dimension;
+    picture.width = picture.height = 600;
+    picture.panels[0].positions.col(2).setZero();
+    picture.faces = dimension == 2 ? Faces(picture.faces.topRows(2)) : Faces();
+    for (int i = 0; i < 8; ++i) picture.panels[0].values.push_back(i & 1);
+    const Image image = DrawPicture(picture).value();
+    EXPECT_GT(Count(image, IsLow), dimension == 2 ? 300 : 4);
+    EXPECT_GT(Count(image, IsHigh), dimension == 2 ? 300 : 4);
+  }
+}
+
+TEST(Picture, LeavesUnknownValuesGrey) {
+  Picture picture = CubePicture();
+  picture.panels[0].values.assign(8, std::nan(""));
+  const Color middle = DrawPicture(picture)->at(60, 60);
+  EXPECT_NEAR(middle.r, middle.g, 8);
+  EXPECT_NEAR(middle.g, middle.b, 8);
+}
+
+TEST(Picture, ShowsHandlesBesideACage) {
+  Picture picture = CubePicture();
+  picture.rig_faces = CubeFaces();
+  picture.panels[0].rig = Cube(1.5).array() - 0.25;
+  const int wires = Count(DrawPicture(picture).value(), IsRig);
+  picture.panels[0].rig_is_handles = true;
+  const int dots = Count(DrawPicture(picture).value(), IsRig);
+  EXPECT_GT(dots, 0);
+  EXPECT_LT(dots, wires);
+}
+
 struct BadCase {
   const char* name;
   std::function<void(Picture&)> spoil;
@@ -206,6 +257,11 @@ INSTANTIATE_TEST_SUITE_P(
            p.panels[0].rig = p.panels[0].positions;
          },
          "face 0 refers to vertex -1 of 8"},
+        {"Values",
+         [](Picture& p) {
+           p.panels[0].values = {1, 2};
+         },
+         "a panel has 2 values for 8 points"},
         {"NotFinite",
          [](Picture& p) { p.panels[0].positions(2, 1) = std::nan(""); },
          "vertex 2 has a coordinate that is not finite"},

@@ -1,0 +1,58 @@
+# What the scripts beside it share. Sourced from the root of the tree, after
+# `out`, the directory of the results, is set.
+
+say() { printf '\n\033[1m%s\033[0m\n' "$*"; }
+
+# Builds release binaries of server and command line.
+build() {
+  deploy/install build
+  export CCACHE_BASEDIR="$PWD" CCACHE_NOHASHDIR=1
+  mkdir -p "$out"
+  cmake --preset release -DDEFORM_TESTS=OFF >"$out/configure.log" ||
+    { cat "$out/configure.log"; exit 1; }
+  cmake --build --preset release --target deformd deformctl
+}
+deformctl() { build/release/bin/deformctl "$@"; }
+
+server_pid=
+stop_server() {
+  [ -n "$server_pid" ] && kill "$server_pid" 2>/dev/null && wait "$server_pid" 2>/dev/null
+  [ -n "${address_pipe:-}" ] && rm -f "$address_pipe"
+  return 0
+}
+trap stop_server EXIT
+trap 'echo; echo "stopped"; exit 130' INT TERM
+
+# On a free port of this machine; deformctl finds it in DEFORM_SERVER.
+start_server() {
+  # The pipe brings the line that tells the port.
+  address_pipe=$(mktemp -u)
+  mkfifo "$address_pipe"
+  # In a session of its own: Ctrl-C is ours, the server is told to stop above.
+  setsid build/release/bin/deformd --listen 127.0.0.1:0 --in-memory --log-level warn >"$address_pipe" &
+  server_pid=$!
+  local address
+  read -r _ _ address <"$address_pipe"
+  rm -f "$address_pipe"
+  export DEFORM_SERVER=$address
+  echo "listening on $address"
+}
+
+# The first value of a name in JSON: json_value NAME <<<"$json"
+json_value() { sed -n "/\"$1\":/{s/.*\"$1\": *\"\{0,1\}\([^\",}]*\).*/\1/p;q}"; }
+
+# The aneurysm of Debian's gmsh-doc package, to $1.
+fetch_vessel() {
+  [ -s "$1" ] && return 0
+  (
+    cd "$(dirname "$1")"
+    rm -f gmsh-doc_*.deb
+    get() { apt-get -o APT::Sandbox::User=root download -qq gmsh-doc; }
+    get || { apt-get update -qq && get; }
+    # Slim images leave /usr/share/doc out when they install: unpack it here.
+    dpkg-deb --fsys-tarfile gmsh-doc_*.deb |
+      tar -xO --wildcards '*/aneurysm_data.stl.gz' | gunzip >vessel.stl.part
+    mv vessel.stl.part "$(basename "$1")"
+    rm -f gmsh-doc_*.deb
+  )
+}

@@ -7,6 +7,7 @@
 #include "server/models/binding_registry.h"
 #include "server/models/model_registry.h"
 #include "server/rpc/grpc_server.h"
+#include "server/sessions/batch_scheduler.h"
 #include "server/sessions/session_manager.h"
 
 namespace deform::server {
@@ -28,12 +29,18 @@ BindingRegistry::Limits BindingLimits(const Options& options) {
           .waiting_calls = options.max_waiting_binds};
 }
 
-SessionEnvironment EnvironmentOf(const Options& options, ThreadPool& compute) {
+BatchScheduler::Options BatchOptions(ThreadPool& compute) {
   return {.executor =
               [&compute](std::function<void()> task) {
                 compute.Submit(std::move(task));
               },
           .pool = &compute,
+          .concurrent = compute.threads()};
+}
+
+SessionEnvironment EnvironmentOf(const Options& options,
+                                 BatchScheduler& scheduler) {
+  return {.scheduler = &scheduler,
           .clock = [] { return std::chrono::steady_clock::now(); },
           .max_participants = options.max_participants,
           .stall_timeout = options.stall_timeout.milliseconds()};
@@ -52,10 +59,11 @@ struct Server::Parts {
                     .niceness = kBackgroundNiceness}),
         models(ModelLimits(options)),
         bindings(models, binds, BindingLimits(options)),
+        scheduler(BatchOptions(*compute)),
         sessions(bindings,
                  {.memory = options.max_sessions_memory.value,
                   .count = options.max_sessions},
-                 EnvironmentOf(options, *compute)) {}
+                 EnvironmentOf(options, scheduler)) {}
 
   // Streams end first; then the steps they left behind, which hold sessions;
   // then the rest, from the top down.
@@ -69,6 +77,7 @@ struct Server::Parts {
   ThreadPool background;  // Weights again, for those who ask to see them.
   ModelRegistry models;
   BindingRegistry bindings;
+  BatchScheduler scheduler;
   SessionManager sessions;
   std::unique_ptr<GrpcServer> grpc;
 };

@@ -32,7 +32,7 @@ Session::Session(std::string id, BindingInUse binding,
       create_time_(absl::Now()),
       environment_(environment),
       memory_(std::move(memory)),
-      deformer_(std::move(binding.binding), environment.pool),
+      deformer_(std::move(binding.binding), nullptr),
       lease_(std::move(binding.lease)),
       queue_(RestPose(deformer_.binding().rig())),
       pose_(RestPose(deformer_.binding().rig())) {
@@ -146,50 +146,43 @@ bool Session::NeedsFrame() const {
 void Session::Schedule() {
   if (scheduled_ || !(CanStep() || NeedsFrame())) return;
   scheduled_ = true;
-  environment_.executor([self = shared_from_this()] { self->Run(); });
+  environment_.scheduler->Add(shared_from_this(), deformer_.binding());
 }
 
-void Session::Run() {
-  std::vector<const FrameEncoding*> encodings;
-  const auto step = BeginStep(encodings);
-  if (step) MoveTo(step->pose);
-  Frames frames;
-  for (const FrameEncoding* encoding : encodings) {
-    frames[encoding] =
-        EncodeFrame(deformer_, *encoding, info_, environment_.pool);
-  }
-  for (const auto& weak : Publish(step, std::move(frames))) {
-    if (const auto receiver = weak.lock()) receiver->Wake();
-  }
-}
-
-std::optional<PoseQueue::Step> Session::BeginStep(
-    std::vector<const FrameEncoding*>& encodings) {
+Session::Step Session::BeginStep() {
+  Step step{.deformer = &deformer_};
   MutexLock lock(mutex_);
   // Who has joined sees the state as it was before anything newer.
-  std::optional<PoseQueue::Step> step;
-  if (CanStep() && !NeedsFrame()) step = queue_.Pop();
+  if (CanStep() && !NeedsFrame()) step.pose = queue_.Pop();
   for (const auto& [number, seat] : seats_) {
-    if ((step || seat.needs_frame) &&
-        std::find(encodings.begin(), encodings.end(), seat.encoding) ==
-            encodings.end()) {
-      encodings.push_back(seat.encoding);
+    if ((step.pose || seat.needs_frame) &&
+        std::find(step.encodings.begin(), step.encodings.end(),
+                  seat.encoding) == step.encodings.end()) {
+      step.encodings.push_back(seat.encoding);
     }
   }
   return step;
 }
 
-void Session::MoveTo(const Pose& pose) {
-  const auto begin = std::chrono::steady_clock::now();
-  const DeformReport report = deformer_.MoveTo(pose);
-  info_.deform_time = std::chrono::duration_cast<std::chrono::microseconds>(
-      std::chrono::steady_clock::now() - begin);
-  info_.columns_applied = report.columns_applied;
-  info_.exit_mismatch = report.exit_mismatch;
+void Session::FinishStep(Step step, ThreadPool* pool) {
+  if (step.pose) Describe(step);
+  Frames frames;
+  for (const FrameEncoding* encoding : step.encodings) {
+    frames[encoding] = EncodeFrame(deformer_, *encoding, info_, pool);
+  }
+  for (const auto& weak : Publish(step.pose, std::move(frames))) {
+    if (const auto receiver = weak.lock()) receiver->Wake();
+  }
+}
+
+void Session::Describe(const Step& step) {
+  info_.deform_time = step.deform_time;
+  info_.columns_applied = step.report.columns_applied;
+  info_.exit_mismatch = step.report.exit_mismatch;
   ++info_.revision;
-  const Vec3 center = BoxOf(pose.vertices).center();
-  const double step = kOriginStep * DiagonalOf(deformer_.binding().rig());
-  if (!((center - info_.origin).norm() <= step)) {
+  const Vec3 center = BoxOf(step.pose->pose.vertices).center();
+  const double far = kOriginStep * DiagonalOf(deformer_.binding().rig());
+  if (!((center - info_.origin).norm() <= far)) {
     info_.origin = center;
     ++info_.origin_number;
   }

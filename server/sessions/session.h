@@ -19,6 +19,7 @@
 #include "core/deform/deformer.h"
 #include "core/frames/encoding.h"
 #include "server/models/binding_registry.h"
+#include "server/sessions/batch_scheduler.h"
 #include "server/sessions/frame.h"
 #include "server/sessions/outbox.h"
 #include "server/sessions/pose_queue.h"
@@ -29,8 +30,6 @@ class Session;
 
 // Never goes back; tests pass their own.
 using Clock = std::function<std::chrono::steady_clock::time_point()>;
-// Runs a task soon, on some thread.
-using Executor = std::function<void(std::function<void()>)>;
 
 // Where a participant's frames go: the other end of a stream. Called on any
 // thread, with no lock of the session held; must not block.
@@ -41,10 +40,9 @@ class Receiver {
   virtual void Wake() = 0;
 };
 
-// What all sessions of a server share. The pool is borrowed.
+// What all sessions of a server share. The scheduler is borrowed.
 struct SessionEnvironment {
-  Executor executor;           // Runs steps; never inside the call.
-  ThreadPool* pool = nullptr;  // Splits the work of a step; may be null.
+  BatchScheduler* scheduler = nullptr;  // Runs steps.
   Clock clock;
   int max_participants = 64;
   // How long a receiver may take to send one message.
@@ -101,7 +99,7 @@ class Participant {
   const int64_t seat_;
 };
 
-// Poses merge into a queue of steps; a step is run by the executor, one at a
+// Poses merge into a queue of steps; a step is run by the scheduler, one at a
 // time: the deformer moves, the revision rises, the frame is encoded once per
 // encoding in use and offered to every participant. Thread-safe; the lock is
 // never held while deforming or encoding.
@@ -145,6 +143,21 @@ class Session : public std::enable_shared_from_this<Session> {
   // came are answered.
   void Drain(const absl::Status& status);
 
+  // What is to be done next.
+  struct Step {
+    std::optional<PoseQueue::Step> pose;  // None: only frames are wanted.
+    std::vector<const FrameEncoding*> encodings;
+    Deformer* deformer = nullptr;
+    // Once the deformer has moved to the pose.
+    DeformReport report;
+    std::chrono::microseconds deform_time{0};
+  };
+  // For the scheduler: between these two calls the deformer moves to the pose.
+  // The second encodes the frames, chunks in parallel on `pool` (may be null),
+  // and hands them to the participants.
+  Step BeginStep();
+  void FinishStep(Step step, ThreadPool* pool);
+
   // Memory of a session of `binding`, roughly.
   static int64_t BytesFor(const BindingFacts& binding);
 
@@ -176,11 +189,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void Schedule() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   Receivers ReceiversLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
-  // The step, in its three parts.
-  void Run();
-  std::optional<PoseQueue::Step> BeginStep(
-      std::vector<const FrameEncoding*>& encodings);
-  void MoveTo(const Pose& pose);
+  void Describe(const Step& step);
   Receivers Publish(const std::optional<PoseQueue::Step>& step, Frames frames);
 
   const std::string id_;
@@ -190,7 +199,7 @@ class Session : public std::enable_shared_from_this<Session> {
   const SessionEnvironment environment_;
   const MemoryBudget::Reservation memory_;
 
-  // Used by the running step only; the queue of the executor hands them from
+  // Used by the running step only; the queue of the scheduler hands them from
   // one to the next.
   Deformer deformer_;
   FrameInfo info_;

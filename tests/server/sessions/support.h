@@ -105,13 +105,22 @@ class SessionRooms {
                         .record->id,
         .rig = BallCage(),
         .scheme = "green"};
-    const auto waiter = bindings_.Create(std::move(spec)).value();
-    binding_id =
-        waiter->Wait(std::chrono::minutes(1)).value().value().record->id;
+    binding_id = Created(std::move(spec));
+  }
+
+  // Of the same ball in a larger cage.
+  std::string AnotherBinding() {
+    BindSpec spec{
+        .tenant = "t",
+        .model_id =
+            bindings_.catalogue().Find("t", binding_id).value()->model_id,
+        .rig = CageOf(Cuboid(Vec3::Constant(-2), Vec3::Constant(2))),
+        .scheme = "green"};
+    return Created(std::move(spec));
   }
 
   SessionEnvironment Environment() {
-    return {.executor = executor.executor(),
+    return {.scheduler = &scheduler,
             .clock = clock.clock(),
             .max_participants = 3,
             .stall_timeout = std::chrono::seconds(10)};
@@ -120,7 +129,7 @@ class SessionRooms {
 
   // Nobody uses them.
   void EvictWeights() {
-    EXPECT_TRUE(bindings_.budget().Reserve(kMemory / 2, "others need").ok());
+    EXPECT_TRUE(bindings_.budget().Reserve(kMemory - 1000, "others need").ok());
     EXPECT_FALSE(bindings_.catalogue()
                      .Find("t", binding_id)
                      .value()
@@ -136,10 +145,15 @@ class SessionRooms {
   std::string binding_id;
 
  private:
+  std::string Created(BindSpec spec) {
+    const auto waiter = bindings_.Create(std::move(spec)).value();
+    return waiter->Wait(std::chrono::minutes(1)).value().value().record->id;
+  }
+
   static constexpr ModelRegistry::Limits kModelLimits = {
       .model_bytes = 1 << 20, .memory = 1 << 20, .count = 10};
-  // Little more than the ball's binding takes.
-  static constexpr int64_t kMemory = 8000;
+  // Little more than two bindings of the ball take.
+  static constexpr int64_t kMemory = 16'000;
   static constexpr BindingRegistry::Limits kBindingLimits = {
       .memory = kMemory, .count = 10, .concurrent = 1, .waiting_calls = 1};
 
@@ -150,8 +164,10 @@ class SessionRooms {
 
  public:
   ManualClock clock;
-  // The steps it holds hold sessions: it goes first.
   ManualExecutor executor;
+  // What it holds are sessions: it goes first.
+  BatchScheduler scheduler{
+      {.executor = executor.executor(), .max_sessions = 3}};
 };
 
 // The whole cage moved.

@@ -327,8 +327,9 @@ TEST(Weights, ComeAsCachedAndAsComputed) {
       AllWeights(server.client(), binding, WeightPrecision::kCachedFloat32);
   const RowMatrix computed =
       AllWeights(server.client(), binding, WeightPrecision::kRecomputedFloat64);
-  // Rounded to float.
-  EXPECT_LT((cached - computed).cwiseAbs().maxCoeff(), 1e-7);
+  // Rounded to float, and far faces computed in it: cached weights promise
+  // 1e-6.
+  EXPECT_LT((cached - computed).cwiseAbs().maxCoeff(), 1e-6);
   EXPECT_LT(
       (computed.leftCols(42).rowwise().sum().array() - 1).abs().maxCoeff(),
       1e-13);

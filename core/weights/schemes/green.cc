@@ -34,7 +34,8 @@ class GreenEvaluator final : public LaneEvaluator {
         tolerance_(BoundaryTolerance(cage)),
         integrals_(cage.dimension() == 2 ? MakeGreen2d(cage)
                                          : MakeGreen3d(cage)),
-        lanes_(cage.dimension() == 2 ? nullptr : MakeGreen3dLanes(cage)) {}
+        lanes_(cage.dimension() == 2 ? MakeGreen2dLanes(cage)
+                                     : MakeGreen3dLanes(cage)) {}
 
   std::array<WeightShare, 4> Extend(const Vec3& point,
                                     int64_t exit_face) const override;

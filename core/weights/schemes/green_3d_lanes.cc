@@ -17,6 +17,7 @@
 #include "hwy/foreach_target.h"
 #include "hwy/highway.h"
 // After foreach_target.h, which reads it once per target.
+#include "core/weights/schemes/green_close-inl.h"
 #include "core/weights/schemes/lane_math-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -117,37 +118,6 @@ HWY_INLINE FaceShare<D> IntegrateFace(D d,
   return share;
 }
 
-// Spreads what the sum of phi misses, and says which lanes are solved. `phi` is
-// V x 16.
-template <class D>
-HWY_INLINE void Close(D d, const GreenLaneCage& cage, double missing,
-                      hn::TFromD<D>* HWY_RESTRICT phi, LanePoints& points) {
-  using T = hn::TFromD<D>;
-  constexpr int kLanes = static_cast<int>(hn::MaxLanes(d));
-  for (int64_t at = 0; at < points.count; at += kLanes) {
-    auto sum = hn::Zero(d);
-    for (int64_t v = 0; v < cage.vertices; ++v) {
-      sum = sum + hn::Load(d, phi + v * kTilePoints + at);
-    }
-    const auto one = hn::Set(d, T{1});
-    const auto inside = sum > hn::Set(d, T{0.5});
-    const auto missed = hn::IfThenElseZero(inside, one) - sum;
-    const auto spread = missed / hn::Set(d, static_cast<T>(cage.vertices));
-    for (int64_t v = 0; v < cage.vertices; ++v) {
-      T* to = phi + v * kTilePoints + at;
-      hn::Store(hn::Load(d, to) + spread, d, to);
-    }
-    const auto solved = hn::Abs(missed) <= hn::Set(d, static_cast<T>(missing));
-    points.solved |= BitsOf(d, solved) << at;
-    points.inside |= BitsOf(d, inside) << at;
-  }
-}
-
-template <class D>
-HWY_INLINE void Add(D d, hn::Vec<D> term, hn::TFromD<D>* to) {
-  hn::Store(hn::Load(d, to) + term, d, to);
-}
-
 // --- In double.
 
 // a and r of all vertices for the points from `at` on: V x 4 x 16.
@@ -200,14 +170,13 @@ void InDouble(const GreenLaneCage& cage, LanePoints& points, void* scratch,
       const auto share = IntegrateFace(d, face, corners, log, cage.touch);
       lost = hn::Or(lost, share.lost);
       for (int q = 0; q < 3; ++q) {
-        Add(d, share.phi[q], weights + face.corner[q] * kTilePoints + at);
+        AddTo(d, share.phi[q], weights + face.corner[q] * kTilePoints + at);
       }
       hn::Store(share.psi, d, weights + (cage.vertices + f) * kTilePoints + at);
     }
     lost_lanes |= BitsOf(d, lost) << at;
   }
-  points.solved = points.inside = 0;
-  Close(d, cage, kMissing, weights, points);
+  Close(d, cage.vertices, kMissing, weights, points);
   points.solved &= ~lost_lanes;
 }
 
@@ -271,8 +240,8 @@ HWY_INLINE uint32_t AddNearFace(const GreenLaneCage& cage, int64_t f,
   }
   const auto share = IntegrateFace(d, face, corners, log, cage.touch);
   for (int q = 0; q < 3; ++q) {
-    Add(half, hn::DemoteTo(half, share.phi[q]),
-        weights + face.corner[q] * kTilePoints + at);
+    AddTo(half, hn::DemoteTo(half, share.phi[q]),
+          weights + face.corner[q] * kTilePoints + at);
   }
   hn::Store(hn::DemoteTo(half, share.psi), half,
             weights + (cage.vertices + f) * kTilePoints + at);
@@ -293,7 +262,7 @@ HWY_INLINE void AddFarFace(const GreenLaneCage& cage, int64_t f,
   }
   const auto share = IntegrateFace(d, face, corners, log, 0.0f);
   for (int q = 0; q < 3; ++q) {
-    Add(d, share.phi[q], weights + face.corner[q] * kTilePoints + at);
+    AddTo(d, share.phi[q], weights + face.corner[q] * kTilePoints + at);
   }
   hn::Store(share.psi, d, weights + (cage.vertices + f) * kTilePoints + at);
 }
@@ -329,8 +298,7 @@ void InFloat(const GreenLaneCage& cage, LanePoints& points, void* scratch,
       }
     }
   }
-  points.solved = points.inside = 0;
-  Close(d, cage, kMissingFloat, weights, points);
+  Close(d, cage.vertices, kMissingFloat, weights, points);
   points.solved &= ~lost;
 }
 

@@ -23,6 +23,7 @@ class GreenLanes {
   virtual int64_t ScratchBytes() const = 0;
 };
 
+std::unique_ptr<const GreenLanes> MakeGreen2dLanes(const Cage& cage);
 std::unique_ptr<const GreenLanes> MakeGreen3dLanes(const Cage& cage);
 
 }  // namespace deform

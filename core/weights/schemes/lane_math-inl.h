@@ -12,6 +12,7 @@
 #define DEFORM_CORE_WEIGHTS_SCHEMES_LANE_MATH_INL_H_
 #endif
 
+#include "core/weights/schemes/lane_points.h"
 #include "hwy/highway.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -132,6 +133,24 @@ struct Space {
         hn::MulAdd(y, hn::Set(d, other[1]), z * hn::Set(d, other[2])));
   }
 };
+
+template <class D>
+HWY_INLINE void AddTo(D d, hn::Vec<D> term, hn::TFromD<D>* HWY_RESTRICT to) {
+  hn::Store(hn::Load(d, to) + term, d, to);
+}
+
+// Rounds the first `count` points of a tile to float: infinity where it cannot.
+HWY_INLINE void RoundTile(const double* HWY_RESTRICT from, int64_t columns,
+                          int64_t count, float* HWY_RESTRICT to) {
+  const hn::CappedTag<double, kTilePoints> d;
+  const hn::Rebind<float, decltype(d)> half;
+  for (int64_t c = 0; c < columns; ++c) {
+    for (int64_t at = c * kTilePoints; at < c * kTilePoints + count;
+         at += static_cast<int64_t>(hn::MaxLanes(d))) {
+      hn::Store(hn::DemoteTo(half, hn::Load(d, from + at)), half, to + at);
+    }
+  }
+}
 
 template <class D>
 HWY_INLINE hn::Mask<D> NoLane(D d) {

@@ -26,8 +26,7 @@ namespace {
 class GreenEvaluator final : public LaneEvaluator {
  public:
   GreenEvaluator(const Cage& cage, Way way)
-      : LaneEvaluator(cage.dimension() == 2 ? Way::kPlain : way,
-                      cage.vertex_count(), cage.face_count(),
+      : LaneEvaluator(way, cage.vertex_count(), cage.face_count(),
                       LaneScale(DiagonalOf(cage)), PointState::kOutside),
         faces_(cage),
         vertices_(cage.vertex_count()),
@@ -42,10 +41,6 @@ class GreenEvaluator final : public LaneEvaluator {
   bool Differentiate(const Vec3& point, int64_t exit_face,
                      Eigen::Ref<Positions> vertex,
                      Eigen::Ref<Positions> normal) const override;
-
- private:
-  PointState EvaluatePoint(const Vec3& eta, std::span<double> phi,
-                           std::span<double> psi) const override;
   void EvaluateLanes(LanePoints& points, void* scratch,
                      double* weights) const override {
     lanes_->Integrate(points, scratch, weights);
@@ -56,6 +51,9 @@ class GreenEvaluator final : public LaneEvaluator {
   }
   int64_t ScratchBytes() const override { return lanes_->ScratchBytes(); }
 
+ private:
+  PointState EvaluatePoint(const Vec3& eta, std::span<double> phi,
+                           std::span<double> psi) const override;
   PointState Close(const Vec3& eta, bool touches, std::span<double> phi) const;
 
   const CageFaces faces_;
@@ -152,8 +150,8 @@ class Green : public CoordinateScheme {
 
 }  // namespace
 
-std::unique_ptr<const WeightEvaluator> MakeGreenEvaluator(const Cage& cage,
-                                                          Way way) {
+std::unique_ptr<const LaneEvaluator> MakeGreenEvaluator(const Cage& cage,
+                                                        Way way) {
   return std::make_unique<GreenEvaluator>(cage, way);
 }
 

@@ -26,8 +26,8 @@ class GreenIntegrals {
 std::unique_ptr<const GreenIntegrals> MakeGreen2d(const Cage& cage);
 std::unique_ptr<const GreenIntegrals> MakeGreen3d(const Cage& cage);
 
-std::unique_ptr<const WeightEvaluator> MakeGreenEvaluator(const Cage& cage,
-                                                          Way way);
+std::unique_ptr<const LaneEvaluator> MakeGreenEvaluator(const Cage& cage,
+                                                        Way way);
 
 // Closer to a face than this, a point lies on it: what rounding its coordinates
 // can move it, and what computing the distance can lose.

@@ -34,6 +34,8 @@ using HalfFloats = hn::Rebind<float, NearDoubles>;
 // An edge l is far if it is shorter than this times the sum of its ends'
 // distances r: from its middle l * 0.67 away.
 constexpr float kFar = 0.6f;
+// If more than one face in so many is near, all might as well be in double.
+constexpr int64_t kMostlyNear = 4;
 // Beyond so many diagonals of the cage, squares and cubes leave float.
 constexpr float kFarthest = 1e4f;
 // r + r - l in units of l: next to the edge, where digits are lost: closer than
@@ -44,6 +46,11 @@ constexpr double kLostAngle = 1e-3;
 // What phi may miss for the closure to be no more than rounding.
 constexpr double kMissing = 1e-12;
 constexpr double kMissingFloat = 4e-6;
+
+// Doubles that a tile in double needs besides its weights.
+HWY_INLINE int64_t DoubleScratch(const GreenLaneCage& cage) {
+  return kTilePoints * (4 * cage.vertices + cage.edges);
+}
 
 template <class D>
 struct Corner {
@@ -267,6 +274,30 @@ HWY_INLINE void AddFarFace(const GreenLaneCage& cage, int64_t f,
   hn::Store(share.psi, d, weights + (cage.vertices + f) * kTilePoints + at);
 }
 
+// Integral of 1 / distance along all edges, E x 16. near[e] is set if an edge
+// is not far from all lanes.
+HWY_INLINE void LookAtFarEdges(const GreenLaneCage& cage,
+                               const float* HWY_RESTRICT seen,
+                               float* HWY_RESTRICT logs,
+                               uint8_t* HWY_RESTRICT near) {
+  const Floats d;
+  for (int64_t e = 0; e < cage.edges; ++e) {
+    const GreenLaneEdge<float>& edge = cage.far_edge[e];
+    const float* r = seen + 3 * kTilePoints;
+    const auto sum = hn::Load(d, r + edge.from * 4 * kTilePoints) +
+                     hn::Load(d, r + edge.to * 4 * kTilePoints);
+    const auto length = hn::Set(d, edge.length);
+    hn::Store(EdgeLogarithm(d, sum, length), d, logs + e * kTilePoints);
+    near[e] = !hn::AllTrue(d, length < hn::Set(d, kFar) * sum);
+  }
+}
+
+HWY_INLINE bool IsNear(const GreenLaneCage& cage, int64_t f,
+                       const uint8_t* near) {
+  const int32_t* edge = cage.far_face[f].edge;
+  return (cage.thin[f] | near[edge[0]] | near[edge[1]] | near[edge[2]]) != 0;
+}
+
 void InFloat(const GreenLaneCage& cage, LanePoints& points, void* scratch,
              float* HWY_RESTRICT weights) {
   const Floats d;
@@ -278,23 +309,25 @@ void InFloat(const GreenLaneCage& cage, LanePoints& points, void* scratch,
   std::memset(weights, 0, sizeof(float) * kTilePoints * cage.vertices);
   uint32_t lost = LookInFloat(cage, points, seen);
   for (int64_t at = 0; at < points.count; at += kLanes) {
-    for (int64_t e = 0; e < cage.edges; ++e) {
-      const GreenLaneEdge<float>& edge = cage.far_edge[e];
-      const float* r = seen + 3 * kTilePoints + at;
-      const auto sum = hn::Load(d, r + edge.from * 4 * kTilePoints) +
-                       hn::Load(d, r + edge.to * 4 * kTilePoints);
-      const auto length = hn::Set(d, edge.length);
-      hn::Store(EdgeLogarithm(d, sum, length), d, logs + e * kTilePoints + at);
-      near[e] = !hn::AllTrue(d, length < hn::Set(d, kFar) * sum);
+    LookAtFarEdges(cage, seen + at, logs + at, near);
+    int64_t near_faces = 0;
+    for (int64_t f = 0; f < cage.faces; ++f) {
+      near_faces += IsNear(cage, f, near);
+    }
+    if (near_faces > cage.faces / kMostlyNear) {
+      double* exact = static_cast<double*>(scratch) + DoubleScratch(cage);
+      InDouble(cage, points, scratch, exact);
+      return RoundTile(exact, cage.vertices + cage.faces, points.count,
+                       weights);
     }
     for (int64_t f = 0; f < cage.faces; ++f) {
-      const int32_t* edge = cage.far_face[f].edge;
-      if ((cage.thin[f] | near[edge[0]] | near[edge[1]] | near[edge[2]]) == 0) {
+      if (!IsNear(cage, f, near)) {
         AddFarFace(cage, f, seen, logs, at, weights);
         continue;
       }
-      for (int half = 0; half < kLanes; half += kHalf) {
-        lost |= AddNearFace(cage, f, points, at + half, weights);
+      const int64_t end = HWY_MIN(at + kLanes, points.count);
+      for (int64_t half = at; half < end; half += kHalf) {
+        lost |= AddNearFace(cage, f, points, half, weights);
       }
     }
   }
@@ -313,7 +346,8 @@ HWY_EXPORT(InDouble);
 HWY_EXPORT(InFloat);
 
 int64_t Green3dLaneScratch(const GreenLaneCage& cage) {
-  return kTilePoints * (4 * cage.vertices + cage.edges) *
+  // What is seen of vertices and edges, and weights in double.
+  return kTilePoints * (5 * cage.vertices + cage.edges + cage.faces) *
          int64_t{sizeof(double)};
 }
 

@@ -18,6 +18,18 @@ class LaneEvaluator : public WeightEvaluator {
   void Evaluate(const PositionsRef& points, WeightBlock& block) const final;
   void EvaluateTiles(const PositionsRef& points, TileBlock& block) const final;
 
+  // The lanes alone, as the above use them: up to 16 points from row `first`
+  // on,
+  LanePoints PointsAt(const PositionsRef& points, int64_t first) const;
+  // their weights, (V + F) x 16, and which of them came out; the latter within
+  // the precision of float. `scratch` has ScratchBytes(), and both are aligned
+  // to 64 bytes.
+  virtual void EvaluateLanes(LanePoints& points, void* scratch,
+                             double* weights) const = 0;
+  virtual void EvaluateLanes(LanePoints& points, void* scratch,
+                             float* weights) const = 0;
+  virtual int64_t ScratchBytes() const = 0;
+
  protected:
   // Lanes work on points times `lane_scale`, a power of two. With Way::kPlain
   // they are not used at all. Lanes that are not `inside` are
@@ -35,18 +47,8 @@ class LaneEvaluator : public WeightEvaluator {
   virtual PointState EvaluatePoint(const Vec3& point, std::span<double> vertex,
                                    std::span<double> normal) const = 0;
 
-  // Fill the weights of up to 16 points, (V + F) x 16, and say which came out;
-  // the latter within the precision of float. `scratch` has ScratchBytes(), and
-  // both are aligned to 64 bytes.
-  virtual void EvaluateLanes(LanePoints& points, void* scratch,
-                             double* weights) const = 0;
-  virtual void EvaluateLanes(LanePoints& points, void* scratch,
-                             float* weights) const = 0;
-  virtual int64_t ScratchBytes() const = 0;
-
   int64_t columns() const { return vertices_ + normals_; }
   void EvaluatePlain(const PositionsRef& points, WeightBlock& block) const;
-  LanePoints PointsAt(const PositionsRef& points, int64_t first) const;
   PointState StateOf(const LanePoints& points, int64_t lane) const;
 
   const Way way_;

@@ -3,6 +3,7 @@
 #include "core/weights/schemes/lane_evaluator.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -14,9 +15,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/base/aligned_array.h"
 #include "core/mesh/rig.h"
 #include "core/weights/cage_faces.h"
 #include "core/weights/schemes/green.h"
+#include "core/weights/schemes/mean_value.h"
 #include "tests/support/instruction_sets.h"
 #include "tests/support/shapes.h"
 
@@ -27,7 +30,9 @@ struct Case {
   std::string name;
   int64_t target;  // Of Highway.
   int dimension;
-  std::unique_ptr<const WeightEvaluator> (*make)(const Cage&, Way);
+  std::unique_ptr<const LaneEvaluator> (*make)(const Cage&, Way);
+  // Whether weights of outside points come out of differences.
+  bool sums_outside = false;
 };
 
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
@@ -38,6 +43,10 @@ std::vector<Case> Cases() {
     const std::string name = hwy::TargetName(target);
     cases.push_back({"Green2dOn" + name, target, 2, MakeGreenEvaluator});
     cases.push_back({"Green3dOn" + name, target, 3, MakeGreenEvaluator});
+    cases.push_back(
+        {"MeanValue2dOn" + name, target, 2, MakeMeanValueEvaluator, true});
+    cases.push_back(
+        {"MeanValue3dOn" + name, target, 3, MakeMeanValueEvaluator, true});
   }
   return cases;
 }
@@ -52,9 +61,26 @@ class LanesOf : public testing::TestWithParam<Case> {
     return std::uniform_real_distribution<double>(low, high)(random_);
   }
 
+  // How many of `points` lanes solve to numbers of type T without help.
+  template <typename T>
+  int64_t Solved(const Cage& cage, const Positions& points) const {
+    const auto lanes = Make(cage, Way::kLanes);
+    const AlignedArray<char> scratch(lanes->ScratchBytes());
+    const AlignedArray<T> weights((cage.vertex_count() + cage.face_count()) *
+                                  kTilePoints);
+    int64_t solved = 0;
+    for (int64_t first = 0; first < points.rows(); first += kTilePoints) {
+      LanePoints lane_points = lanes->PointsAt(points, first);
+      lanes->EvaluateLanes(lane_points, scratch.get(), weights.get());
+      const uint32_t present = (uint32_t{1} << lane_points.count) - 1;
+      solved += std::popcount(lane_points.solved & present);
+    }
+    return solved;
+  }
+
   // Not convex, without symmetries.
   Shape Blob() const {
-    Shape shape = dimension() == 3 ? Icosphere(1, 2) : RegularLoop2d(1, 23);
+    Shape shape = dimension() == 3 ? Icosphere(1, 1) : RegularLoop2d(1, 23);
     for (int64_t i = 0; i < shape.positions.rows(); ++i) {
       shape.positions.row(i) *= 1 + 0.2 * std::sin(2.9 * i);
     }
@@ -90,7 +116,7 @@ class LanesOf : public testing::TestWithParam<Case> {
     return points;
   }
 
-  std::unique_ptr<const WeightEvaluator> Make(const Cage& cage, Way way) const {
+  std::unique_ptr<const LaneEvaluator> Make(const Cage& cage, Way way) const {
     return GetParam().make(cage, way);
   }
 
@@ -129,7 +155,7 @@ class LanesOf : public testing::TestWithParam<Case> {
         ASSERT_FALSE(std::isnan(actual) || std::isnan(tile));
       }
       ASSERT_LE(worst, in_double * unit) << i << ": " << points.row(i);
-      ASSERT_LE(worst_tile, 1e-6 * unit + underflow)
+      ASSERT_LE(worst_tile, (1e-6 + in_double) * unit + underflow)
           << i << ": " << points.row(i);
     }
   }
@@ -149,8 +175,15 @@ TEST_P(LanesOf, AgreeWithThePlainWayForAnyNumberOfPoints) {
   }
 }
 
+TEST_P(LanesOf, SolveNearlyAllPointsOfAModelThemselves) {
+  const Cage cage = CageOf(Blob());
+  const Positions points = RandomPoints(500, 0.55);
+  EXPECT_GE(Solved<double>(cage, points), 495);
+  EXPECT_GE(Solved<float>(cage, points), 495);
+}
+
 TEST_P(LanesOf, AgreeThroughoutTheCageAndAround) {
-  ExpectAsPlain(CageOf(Blob()), RandomPoints(1000, 1.5));
+  ExpectAsPlain(CageOf(Blob()), RandomPoints(500, 1.5));
 }
 
 TEST_P(LanesOf, AgreeAtEveryDistanceFromFacesEdgesAndCorners) {
@@ -158,7 +191,7 @@ TEST_P(LanesOf, AgreeAtEveryDistanceFromFacesEdgesAndCorners) {
   for (int k = 1; k <= 12; ++k) {
     SCOPED_TRACE(k);
     ExpectAsPlain(cage,
-                  PointsNear(cage, 150, std::pow(10, -k) * DiagonalOf(cage)));
+                  PointsNear(cage, 60, std::pow(10, -k) * DiagonalOf(cage)));
   }
   ExpectAsPlain(cage, cage.vertices());
 }
@@ -167,8 +200,9 @@ TEST_P(LanesOf, AgreeFarAway) {
   const Cage cage = CageOf(Blob());
   for (const double distance : {10.0, 1e3, 1e5, 1e9}) {
     SCOPED_TRACE(distance);
-    // Terms of the size of the distance cancel, in either way.
-    ExpectAsPlain(cage, RandomPoints(40, distance), 1e-15 * distance + 1e-12);
+    // Terms cancel more and more, in either way.
+    ExpectAsPlain(cage, RandomPoints(40, distance),
+                  1e-12 + (GetParam().sums_outside ? 1e-11 : 1e-15) * distance);
   }
 }
 
@@ -206,8 +240,8 @@ TEST_P(LanesOf, AgreeInFlatCagesOfThinFaces) {
     Positions points = RandomPoints(300, 1.3);
     points.col(1) *= flat;
     // Thin faces lose a factor of their aspect, in either way.
-    ExpectAsPlain(cage, points, 1e-13 / flat);
-    ExpectAsPlain(cage, PointsNear(cage, 100, 1e-3 * flat), 1e-13 / flat);
+    ExpectAsPlain(cage, points, 1e-12 / flat);
+    ExpectAsPlain(cage, PointsNear(cage, 60, 1e-3 * flat), 1e-12 / flat);
   }
 }
 

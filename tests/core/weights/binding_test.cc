@@ -108,18 +108,6 @@ TEST(Bind, RefusesExitFacesThatDoNotExist) {
             "EXIT_FACE_OUT_OF_RANGE");
 }
 
-TEST(Bind, RefusesACageWhosePartsOverlapAroundAPoint) {
-  BindRequest request = RowOfPoints(1);
-  // A cross of two beams; no face has its centroid within the other beam.
-  request.rig = CageOf(Joined(Cuboid({-3, -0.9, -0.9}, {3, 0.9, 0.9}),
-                              Cuboid({-0.9, -3, -0.8}, {0.9, 3, 0.8})));
-  const absl::Status status = Bind(request, {}).status();
-  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_EQ(DetailOf(status).reason, "CAGE_OVERLAPPING");
-  EXPECT_THAT(std::string(status.message()),
-              HasSubstr("winds neither 0 nor 1 times around point 0"));
-}
-
 TEST(UnbindablePoints, FailTheCallWithTheirNumberAndTheFirstTen) {
   const absl::Status status = Bind(RowOfPoints(20), {}).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);

@@ -187,13 +187,5 @@ TEST(GreenIn3d, PowersOfTwoChangeNoBitOfTheVertexWeights) {
   }
 }
 
-TEST(GreenIn3d, CageThatWindsTwiceAroundAPointIsFound) {
-  const Cage cage = CageOf(Joined(Cuboid({-3, -0.9, -0.9}, {3, 0.9, 0.9}),
-                                  Cuboid({-0.9, -3, -0.8}, {0.9, 3, 0.8})));
-  const WeightBlock block = Evaluate(cage, OnePoint(0.1, 0.2, 0.3));
-  EXPECT_EQ(block.states[0], PointState::kOverlap);
-  EXPECT_EQ(block.vertex.norm(), 0);
-}
-
 }  // namespace
 }  // namespace deform

@@ -32,7 +32,9 @@ absl::Status CheckPoseUpdate(const PoseUpdate& update, const Rig& rig) {
   }
   DEFORM_RETURN_IF_ERROR(
       CheckPositions(update.positions, "pose entry", "pose.positions"));
-  if (DimensionOf(rig) == 2 && !(update.positions.col(2).array() == 0).all()) {
+  // Of no rows there is no column either.
+  if (DimensionOf(rig) == 2 && update.positions.rows() > 0 &&
+      !(update.positions.col(2).array() == 0).all()) {
     return InvalidInput("NOT_PLANAR", "pose.positions",
                         "a 2D pose must lie in the plane z = 0");
   }

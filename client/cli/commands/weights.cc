@@ -24,23 +24,18 @@ struct Options {
   int64_t count = 0;
 };
 
-// Writes rows one after the other; a row's vertex weights come first.
+// Writes rows one after the other, below a line of titles in CSV; a row's
+// vertex weights come first.
 class RowWriter {
  public:
   RowWriter(const Options& options, std::ostream& out)
       : options_(options), out_(out) {}
 
-  void Header(const BindingInfo& binding) {
-    if (options_.format != "csv") return;
-    out_ << "point";
-    for (int64_t k = 0; k < binding.vertex_count; ++k) out_ << ",v" << k;
-    for (int64_t j = 0; j < binding.normal_count; ++j) out_ << ",n" << j;
-    out_ << "\n";
-  }
-
   void Row(int64_t point, const WeightRows& rows, int64_t i) {
     std::string text;
     const bool csv = options_.format == "csv";
+    if (csv && !begun_) AddTitles(rows, text);
+    begun_ = true;
     if (csv) absl::StrAppend(&text, point);
     for (const double weight : rows.vertex.row(i)) Add(weight, csv, text);
     for (const double weight : rows.normal.row(i)) Add(weight, csv, text);
@@ -50,9 +45,10 @@ class RowWriter {
 
  private:
   void Add(double weight, bool csv, std::string& text) const {
-    if (csv) {
-      absl::StrAppendFormat(&text, options_.in_double ? ",%.17g" : ",%.9g",
-                            weight);
+    if (csv && options_.in_double) {
+      absl::StrAppendFormat(&text, ",%.17g", weight);
+    } else if (csv) {
+      absl::StrAppendFormat(&text, ",%.9g", weight);
     } else if (options_.in_double) {
       text.append(reinterpret_cast<const char*>(&weight), sizeof(weight));
     } else {
@@ -61,8 +57,20 @@ class RowWriter {
     }
   }
 
+  static void AddTitles(const WeightRows& rows, std::string& text) {
+    text = "point";
+    for (int64_t k = 0; k < rows.vertex.cols(); ++k) {
+      absl::StrAppend(&text, ",v", k);
+    }
+    for (int64_t j = 0; j < rows.normal.cols(); ++j) {
+      absl::StrAppend(&text, ",n", j);
+    }
+    text += '\n';
+  }
+
   const Options& options_;
   std::ostream& out_;
+  bool begun_ = false;
 };
 
 absl::Status NotWritten(const std::string& path) {
@@ -124,7 +132,6 @@ absl::Status WriteInto(Client& client, const Options& options,
   std::ofstream file(options.out, std::ios::binary | std::ios::trunc);
   if (!file) return NotWritten(options.out);
   RowWriter writer(options, file);
-  writer.Header(binding);
   int64_t count = 0;
   DEFORM_RETURN_IF_ERROR(
       ForRows(client, options, binding, console,
@@ -161,7 +168,6 @@ absl::Status Run(const Options& options, Context& context) {
     return PrintJson(client, options, binding, context.console);
   }
   RowWriter writer(options, context.console.out());
-  writer.Header(binding);
   return ForRows(client, options, binding, context.console,
                  [&](int64_t point, const WeightRows& rows, int64_t i) {
                    writer.Row(point, rows, i);

@@ -61,7 +61,10 @@ struct Size {
 class ApplyWeights : public testing::TestWithParam<Size> {};
 
 TEST_P(ApplyWeights, AgreesWithThePlainVersion) {
-  const auto [tiles, columns, sets] = GetParam();
+  // Not a structured binding: Clang 14 lets no lambda see one.
+  const int64_t tiles = GetParam().tiles;
+  const int64_t columns = GetParam().columns;
+  const int64_t sets = GetParam().sets;
   const Problem problem(tiles, columns, sets);
   std::vector<double> judge(tiles * sets * kTileSums);
   ApplyTilesPlain(problem.weights.tile(0), tiles, columns, sets,
@@ -81,7 +84,10 @@ TEST_P(ApplyWeights, AgreesWithThePlainVersion) {
 }
 
 TEST_P(ApplyWeights, AddsSomeColumnsAsThePlainVersionDoes) {
-  const auto [tiles, columns, sets] = GetParam();
+  // Not a structured binding: Clang 14 lets no lambda see one.
+  const int64_t tiles = GetParam().tiles;
+  const int64_t columns = GetParam().columns;
+  const int64_t sets = GetParam().sets;
   const Problem problem(tiles, columns, sets);
   std::vector<int32_t> index;
   for (int32_t c = 0; c < columns; c += 3) index.push_back(c);

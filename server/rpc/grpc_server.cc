@@ -1,6 +1,8 @@
 #include "server/rpc/grpc_server.h"
 
 #include <grpc/grpc.h>
+#include <grpc/support/log.h>
+#include <spdlog/spdlog.h>
 
 #include <thread>
 
@@ -54,6 +56,21 @@ void Configure(const GrpcServer::Options& options,
       grpc::ResourceQuota("deformd").SetMaxThreads(options.max_call_threads));
 }
 
+// What matters of gRPC's own words, such as one for every address that it
+// cannot listen on, we say ourselves.
+void LogOfGrpc(gpr_log_func_args* line) {
+  spdlog::debug("gRPC: {}", line->message);
+}
+
+// Kept for ever: gRPC's own end may wait 10 s for one of its pollers.
+void InitGrpc() {
+  [[maybe_unused]] static const bool kept = [] {
+    gpr_set_log_function(LogOfGrpc);
+    grpc_init();
+    return true;
+  }();
+}
+
 // `listen` with the port that was chosen.
 std::string AddressOf(const std::string& listen, int port) {
   if (listen.rfind("unix:", 0) == 0) return listen;
@@ -76,8 +93,7 @@ class GrpcServerImpl final : public GrpcServer {
   }
 
   absl::Status Start(const Options& options) {
-    // Kept for ever: gRPC's own end may wait 10 s for one of its pollers.
-    [[maybe_unused]] static const bool kept = (grpc_init(), true);
+    InitGrpc();
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
     grpc::ServerBuilder builder;

@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <string>
@@ -230,8 +231,9 @@ TEST(Deformd, DescribesItsServices) {
 TEST(Deformd, DoesNotShareAPort) {
   Daemon first;
   Process second({"--listen", first.address()});
-  EXPECT_THAT(second.ReadErrors(),
-              HasSubstr("cannot listen on " + first.address()));
+  const std::string errors = second.ReadErrors();
+  EXPECT_THAT(errors, HasSubstr("cannot listen on " + first.address()));
+  EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << errors;
   EXPECT_EQ(second.Wait(), 1);
 }
 

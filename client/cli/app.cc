@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/strings/str_replace.h"
 #include "client/cli/command.h"
 #include "client/cli/exit_code.h"
@@ -52,6 +53,21 @@ const CLI::App& Chosen(const CLI::App& app) {
   return chosen.empty() ? app : *chosen.front();
 }
 
+// CLI11 tells of a command that there is not only that one is required.
+std::string WhatIsWrong(const CLI::App& app, const CLI::ParseError& error) {
+  const std::vector<std::string> rest = app.remaining();
+  const auto word = std::find_if(
+      rest.begin(), rest.end(),
+      [](const std::string& text) { return text.empty() || text[0] != '-'; });
+  if (!app.get_subcommands().empty() || word == rest.end()) {
+    return error.what();
+  }
+  std::vector<absl::string_view> names;
+  for (const Command* command : AllCommands()) names.push_back(command->name);
+  return absl::StrCat("there is no command '", *word, "', only ",
+                      absl::StrJoin(names, ", "));
+}
+
 int EndParse(const CLI::App& app, const CLI::ParseError& error,
              Console& console) {
   if (error.get_exit_code() == 0) {
@@ -60,9 +76,9 @@ int EndParse(const CLI::App& app, const CLI::ParseError& error,
     return kOk;
   }
   const bool top = app.get_subcommands().empty();
-  console.Error(UsageError(absl::StrCat(error.what(), "; see 'deformctl ",
-                                        top ? "" : Chosen(app).get_name(),
-                                        top ? "" : " ", "--help'")));
+  console.Error(UsageError(absl::StrCat(
+      WhatIsWrong(app, error), "; see 'deformctl ",
+      top ? "" : Chosen(app).get_name(), top ? "" : " ", "--help'")));
   return kUsage;
 }
 

@@ -37,11 +37,14 @@ absl::StatusOr<RigArrays> CageOf(const MeshFile& file,
                                  const std::string& path) {
   if (file.dimension == 3) {
     if (file.faces.rows() == 0) {
-      return WithExit(kBadFile,
-                      InvalidInput("NO_CAGE", "",
-                                   absl::StrCat(path,
-                                                ": has no faces: a cage "
-                                                "is a closed mesh")));
+      return WithExit(
+          kBadFile,
+          InvalidInput(
+              "NO_CAGE", "",
+              absl::StrCat(
+                  path, ": has no faces: the cage of a 3D ",
+                  "model is a closed mesh",
+                  file.edges.rows() == 0 ? "" : "; loops are for 2D models")));
     }
     return RigArrays(RigKind::kCage, 3, file.positions, file.faces);
   }

@@ -2,7 +2,8 @@
 // clear of the model.
 //
 // A surface that never touches the model keeps it on the same side, which the
-// winding number confirms in the end.
+// winding number confirms in the end. In 2D the same surface, sliced near the
+// plane of the model, gives loops.
 #include "core/mesh/cage_making.h"
 
 #include <algorithm>
@@ -15,6 +16,7 @@
 #include "core/base/status_macros.h"
 #include "core/mesh/distance_grid.h"
 #include "core/mesh/offset_surface.h"
+#include "core/mesh/outline.h"
 #include "core/mesh/self_intersection.h"
 #include "core/mesh/topology.h"
 #include "core/mesh/triangle.h"
@@ -23,8 +25,9 @@
 namespace deform {
 namespace {
 
-// In margins.
+// In margins. At the level of the slice lies no node.
 constexpr double kSpacing = 0.5;
+constexpr double kSliceLevel = 0.17;
 constexpr double kPadding = 2.5;
 constexpr double kClearance = 0.35;
 
@@ -33,11 +36,10 @@ constexpr double kClearance = 0.35;
 constexpr double kLongestSide = 2;
 constexpr double kMinRoundness = 0.2;
 
+constexpr int kDefaultTriangles = 200;
+constexpr int kDefaultEdges = 40;
+
 absl::Status CheckOptions(const Mesh& model, const CageMakingOptions& options) {
-  if (model.dimension() != 3) {
-    return InvalidInput("WRONG_DIMENSION", "",
-                        "cages are made for 3D models only");
-  }
   if (options.target_faces < 8 || options.target_faces > 20000) {
     return InvalidInput(
         "INVALID_OPTION", "target_faces",
@@ -102,6 +104,15 @@ double MeanSide(const TriangleSurface& surface, int count) {
   return std::sqrt(4 / std::sqrt(3) * area / count);
 }
 
+double MeanSide(const Outline& outline, int count) {
+  double length = 0;
+  for (const auto& edge : outline.edges.rowwise()) {
+    length += (outline.positions.row(edge[1]) - outline.positions.row(edge[0]))
+                  .norm();
+  }
+  return length / count;
+}
+
 // Moves each vertex half way to the mean of its neighbours, a few times:
 // marching leaves thin triangles that decimation could not get rid of.
 void Relax(TriangleSurface& surface) {
@@ -127,10 +138,16 @@ Positions Normalized(const Mesh& model) {
          model.box().diagonal();
 }
 
-bool EnclosesAll(const TriangleSurface& surface, const Positions& positions) {
+// Positions and faces of a cage.
+struct Candidate {
+  Positions vertices;
+  Faces faces;
+};
+
+bool EnclosesAll(const Candidate& cage, const Positions& positions) {
   for (const auto& row : positions.rowwise()) {
     const double winding =
-        WindingNumber(surface.positions, surface.faces, row.transpose());
+        WindingNumber(cage.vertices, cage.faces, row.transpose());
     if (!(std::abs(winding - 1) < 0.5)) return false;
   }
   return true;
@@ -146,8 +163,17 @@ class Maker {
     Relax(offset_);
   }
 
-  // Nullopt if the surface runs through itself or does not hold the model.
-  std::optional<TriangleSurface> Make(int target_faces) const {
+  // Nullopt if it runs through itself or does not hold the model.
+  std::optional<Candidate> Make(int dimension, int target_faces) const {
+    Candidate cage =
+        dimension == 2 ? MakeLoops(target_faces) : MakeSurface(target_faces);
+    if (FindSelfIntersection(cage.vertices, cage.faces)) return std::nullopt;
+    if (!EnclosesAll(cage, positions_)) return std::nullopt;
+    return cage;
+  }
+
+ private:
+  Candidate MakeSurface(int target_faces) const {
     const double longest = kLongestSide * MeanSide(offset_, target_faces);
     TriangleSurface surface =
         Decimate(offset_, target_faces,
@@ -156,33 +182,40 @@ class Maker {
                           Roundness(a, b, c) >= kMinRoundness &&
                           KeepsClear(grid_, kClearance * margin_, a, b, c);
                  });
-    if (FindSelfIntersection(surface.positions, surface.faces)) {
-      return std::nullopt;
-    }
-    if (!EnclosesAll(surface, positions_)) return std::nullopt;
-    return surface;
+    return {std::move(surface.positions), std::move(surface.faces)};
   }
 
- private:
+  Candidate MakeLoops(int target_edges) const {
+    const Outline outline = Slice(offset_, kSliceLevel * margin_);
+    const double longest = kLongestSide * MeanSide(outline, target_edges);
+    Outline loops = Simplify(
+        outline, target_edges,
+        [&](const Vec3& before, const Vec3& gone, const Vec3& next) {
+          return (next - before).norm() <= longest &&
+                 KeepsClear(grid_, kClearance * margin_, before, gone, next);
+        });
+    return {std::move(loops.positions), std::move(loops.edges)};
+  }
+
   Positions positions_;
   double margin_;
   DistanceGrid grid_;
   TriangleSurface offset_;
 };
 
-// The surface with the fewest faces of several attempts; the first one that
-// comes near the target ends them.
-std::optional<TriangleSurface> FindSurface(const Mesh& model,
-                                           const CageMakingOptions& options) {
-  std::optional<TriangleSurface> best;
+// The one with the fewest faces of several attempts; the first one that comes
+// near the target ends them.
+std::optional<Candidate> FindCage(const Mesh& model,
+                                  const CageMakingOptions& options) {
+  std::optional<Candidate> best;
   for (const double widening : {1.0, 1.4, 2.0, 3.0}) {
     const Maker maker(model, widening * options.margin);
     for (const double more : {1.0, 1.5, 2.0}) {
       const int target = static_cast<int>(more * options.target_faces);
-      auto surface = maker.Make(target);
-      if (!surface) continue;
-      if (!best || surface->faces.rows() < best->faces.rows()) {
-        best = std::move(surface);
+      auto cage = maker.Make(model.dimension(), target);
+      if (!cage) continue;
+      if (!best || cage->faces.rows() < best->faces.rows()) {
+        best = std::move(cage);
       }
       if (best->faces.rows() <= 2 * options.target_faces) return best;
       break;
@@ -194,19 +227,25 @@ std::optional<TriangleSurface> FindSurface(const Mesh& model,
 }  // namespace
 
 absl::StatusOr<Cage> MakeCage(const Mesh& model,
-                              const CageMakingOptions& options) {
+                              const CageMakingOptions& given) {
+  CageMakingOptions options = given;
+  const bool planar = model.dimension() == 2;
+  if (options.target_faces == 0) {
+    options.target_faces = planar ? kDefaultEdges : kDefaultTriangles;
+  }
   DEFORM_RETURN_IF_ERROR(CheckOptions(model, options));
-  std::optional<TriangleSurface> surface = FindSurface(model, options);
-  if (!surface) {
+  std::optional<Candidate> cage = FindCage(model, options);
+  if (!cage) {
     return MakeError(absl::StatusCode::kFailedPrecondition,
                      "no cage was found that encloses the model without "
                      "running through itself; more faces or another margin may "
                      "help",
                      {.reason = "NO_CAGE_FOUND"});
   }
-  Positions vertices = surface->positions * model.box().diagonal();
+  Positions vertices = cage->vertices * model.box().diagonal();
   vertices.rowwise() += model.box().center().transpose();
-  return Cage::Create(3, std::move(vertices), std::move(surface->faces));
+  return Cage::Create(model.dimension(), std::move(vertices),
+                      std::move(cage->faces));
 }
 
 }  // namespace deform

@@ -80,7 +80,9 @@ INSTANTIATE_TEST_SUITE_P(
     Arguments, CliRefuses,
     testing::ValuesIn<BadUsage>({
         {"Nothing", {}, "see 'deformctl --help'"},
-        {"UnknownCommand", {"dance"}, "see 'deformctl --help'"},
+        {"UnknownCommand",
+         {"dance", "--json=no", "m"},
+         "there is no command 'dance', only register, bind, deform, "},
         {"UnknownOption",
          {"list", "models", "--colour"},
          "--colour; see 'deformctl list --help'"},
@@ -275,6 +277,24 @@ TEST(Cage, IsMadeWithoutAServer) {
   const MeshFile cage = ReadMeshFile(path).value();
   EXPECT_EQ(cage.faces.rows(), result.json()["face_count"]);
   EXPECT_TRUE(Cage::Create(3, cage.positions, cage.faces).ok());
+}
+
+TEST(Cage, OfAFlatFileAreLoops) {
+  const std::string path = testing::TempDir() + "/square_cage.obj";
+  const std::string square = WriteTemporary(
+      "square.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n");
+  const CliResult result =
+      RunCli({"cage", square, "--margin", "0.1", "--out", path});
+  ASSERT_EQ(result.exit_code, kOk) << result.err;
+  EXPECT_THAT(result.out, HasSubstr(" edges\n"));
+  const MeshFile cage = ReadMeshFile(path).value();
+  EXPECT_EQ(cage.dimension, 2);
+  EXPECT_TRUE(Cage::Create(2, cage.positions, cage.edges).ok());
+  EXPECT_EQ(RunCli({"cage", square, "--margin", "0.1", "--dimension", "3",
+                    "--out", path})
+                .exit_code,
+            kOk);
+  EXPECT_EQ(ReadMeshFile(path)->dimension, 3);
 }
 
 TEST(Cage, SaysWhyThereIsNone) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <string>
 
@@ -98,6 +99,59 @@ INSTANTIATE_TEST_SUITE_P(
     }),
     [](const auto& test) { return test.param.name; });
 
+// The unit square, with a hole in the middle if `cells` are taken out.
+Shape SquareWithHole(int cells) {
+  const Shape grid = Grid2d(12);
+  Shape shape{grid.positions, Faces(grid.faces.rows(), 3)};
+  int64_t count = 0;
+  for (const auto& face : grid.faces.rowwise()) {
+    const Vec3 middle =
+        (grid.positions.row(face[0]) + grid.positions.row(face[1]) +
+         grid.positions.row(face[2])) /
+        3;
+    const double off =
+        std::max(std::abs(middle.x() - 0.5), std::abs(middle.y() - 0.5));
+    if (off > cells / 24.0) shape.faces.row(count++) = face;
+  }
+  shape.faces.conservativeResize(count, 3);
+  // Every point counts: those in the hole go elsewhere.
+  for (int64_t v = 0; v < shape.positions.rows(); ++v) {
+    if (!(shape.faces.array() == v).any()) {
+      shape.positions.row(v) = shape.positions.row(0);
+    }
+  }
+  return shape;
+}
+
+TEST(CageMaking, MakesLoopsAroundA2dModel) {
+  const Mesh model = MeshOf(Grid2d(12), 2);
+  const auto cage = MakeCage(model, {.target_faces = 12, .margin = 0.1});
+  ASSERT_TRUE(cage.ok()) << cage.status();
+  EXPECT_EQ(cage->dimension(), 2);
+  EXPECT_LE(cage->face_count(), 24);
+  EXPECT_EQ(cage->vertex_count(), cage->face_count());
+  const double margin = 0.1 * model.box().diagonal();
+  for (const auto& row : model.positions().rowwise()) {
+    const Vec3 point = row;
+    EXPECT_NEAR(WindingNumber(*cage, point), 1, 1e-9);
+    for (const auto& edge : cage->faces().rowwise()) {
+      const Vec3 near = ClosestOnSegment(point, cage->vertices().row(edge[0]),
+                                         cage->vertices().row(edge[1]));
+      EXPECT_GE((near - point).norm(), margin / 4);
+    }
+  }
+}
+
+TEST(CageMaking, MakesALoopAroundAWideHoleOfA2dModel) {
+  const CageMakingOptions options{.margin = 0.04};
+  const auto ring = MakeCage(MeshOf(SquareWithHole(6), 2), options);
+  ASSERT_TRUE(ring.ok()) << ring.status();
+  EXPECT_NEAR(WindingNumber(*ring, {0.5, 0.5, 0}), 0, 1e-9);
+  const auto whole = MakeCage(MeshOf(SquareWithHole(0), 2), options);
+  ASSERT_TRUE(whole.ok()) << whole.status();
+  EXPECT_NEAR(WindingNumber(*whole, {0.5, 0.5, 0}), 1, 1e-9);
+}
+
 void ExpectRefused(const Mesh& model, const CageMakingOptions& options,
                    const std::string& reason, const std::string& message) {
   const auto cage = MakeCage(model, options);
@@ -114,7 +168,6 @@ TEST(CageMaking, RefusesWhatItCannotDo) {
                 "between 0.01 and 1 diagonals of the model, not 0.001");
   ExpectRefused(model, {.margin = std::numeric_limits<double>::quiet_NaN()},
                 "INVALID_OPTION", "not nan");
-  ExpectRefused(MeshOf(Grid2d(2), 2), {}, "WRONG_DIMENSION", "3D models only");
   ExpectRefused(MeshOf({Positions::Ones(3, 3), Faces(0, 3)}), {},
                 "MODEL_WITHOUT_EXTENT", "all points of the model are at one");
 }

@@ -24,10 +24,16 @@ constexpr Hint kHints[] = {
     {"EXIT_AMBIGUOUS",
      "name the face with --exit FACE, give one per point with "
      "--exit-per-point FILE, or leave them with --unbindable report"},
+    {"EXIT_FACE_OUT_OF_RANGE",
+     "faces are counted from 0, as triangles: a polygon of k corners in the "
+     "file counts as k - 2 of them, in its place"},
     {"OUTSIDE_HULL",
      "add handles around the model, such as the corners of its enlarged "
      "bounding box, or leave these points with --unbindable report"},
     {"NOT_CONVERGED", "leave these points with --unbindable report"},
+    {"CAGE_OVERLAPPING",
+     "pull the parts of the cage apart; faces are counted from 0, as "
+     "triangles: a polygon of k corners in the file counts as k - 2 of them"},
     {"CAGE_INVERTED", "use --flip-cage to turn the cage's faces outward"},
     {"CAGE_NOT_CLOSED", "close the hole: every edge needs two faces"},
     {"NOT_PLANAR", "use --dimension 3 if the model is not flat"},

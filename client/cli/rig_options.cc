@@ -68,7 +68,9 @@ void RigOptions::AddTo(CLI::App& app, bool both) {
   group
       ->add_option("--exit", exit,
                    "How points outside the cage are reached: 'auto', or the "
-                   "faces they leave through, such as 3,17")
+                   "faces they leave through, such as 3,17. Faces are counted "
+                   "from 0, as triangles: a polygon of k corners in the file "
+                   "counts as k - 2 of them, in its place")
       ->type_name("auto|FACE,...");
   group
       ->add_option("--exit-per-point", exit_per_point,

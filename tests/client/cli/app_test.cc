@@ -59,6 +59,11 @@ TEST(Help, OfEveryCommandShowsExamples) {
   }
 }
 
+TEST(Help, TellsHowFacesAreCounted) {
+  EXPECT_THAT(RunCli({"bind", "--help"}).out,
+              HasSubstr("Faces are counted from 0, as triangles"));
+}
+
 struct BadUsage {
   const char* name;
   std::vector<std::string> arguments;

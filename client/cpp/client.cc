@@ -260,7 +260,8 @@ absl::Status Client::GetWeights(
   return status.ok() ? end : status;
 }
 
-absl::StatusOr<QualityInfo> Client::GetQuality(const QualityQuery& query) {
+absl::StatusOr<QualityInfo> Client::GetQuality(
+    const QualityQuery& query, const ProgressCallback& progress) {
   v1::GetQualityRequest request;
   request.set_tenant(impl_->options.tenant);
   request.set_binding_id(query.binding_id);
@@ -280,7 +281,13 @@ absl::StatusOr<QualityInfo> Client::GetQuality(const QualityQuery& query) {
   absl::StatusOr<QualityInfo> info =
       absl::InternalError("the server ended without a report");
   while (call->Read(&response)) {
-    if (response.has_report()) {
+    if (response.has_progress()) {
+      if (progress &&
+          !progress(static_cast<int64_t>(response.progress().points_done()),
+                    static_cast<int64_t>(response.progress().points_total()))) {
+        context.TryCancel();
+      }
+    } else if (response.has_report()) {
       info = FromProto(response.report());
     } else if (info.ok()) {
       const absl::Status added = AddPoints(response.points(), *info);

@@ -69,8 +69,8 @@ struct QualityQuery {
   bool with_points = false;
 };
 
-// Done and total: bytes of an upload, points of a binding. Called on the
-// calling thread. False gives up: the server stops and the call returns
+// Done and total: bytes of an upload, points of a binding or a report. Called
+// on the calling thread. False gives up: the server stops and the call returns
 // Cancelled.
 using ProgressCallback = std::function<bool(int64_t done, int64_t total)>;
 
@@ -110,7 +110,8 @@ class Client {
       int64_t count, absl::FunctionRef<absl::Status(const WeightRows&)> rows);
 
   // How a binding came out, and what a pose does to its model.
-  absl::StatusOr<QualityInfo> GetQuality(const QualityQuery& query);
+  absl::StatusOr<QualityInfo> GetQuality(const QualityQuery& query,
+                                         const ProgressCallback& progress = {});
 
   absl::StatusOr<std::vector<SchemeInfo>> ListSchemes();
 

@@ -64,6 +64,12 @@ PointQuality QualityOf(int64_t point, const Eigen::Matrix3d& jacobian,
   return QualityOf(point, Eigen::Matrix2d(jacobian.topLeftCorner<2, 2>()));
 }
 
+// At one point that was looked at.
+struct Found {
+  Measured measured = Measured::kFixed;
+  PointQuality quality;
+};
+
 // The value below which `part` of all lie; reorders them.
 double Quantile(std::vector<double>& values, double part) {
   const auto at = values.begin() +
@@ -128,46 +134,51 @@ void MeasureVolume(const std::shared_ptr<const Binding>& binding,
 
 }  // namespace
 
+int64_t PointsToMeasure(const BindingFacts& binding,
+                        const PoseQualityRequest& request) {
+  return std::min(binding.point_count(), request.max_points);
+}
+
 absl::StatusOr<PoseQuality> MeasurePose(
     const std::shared_ptr<const Binding>& binding,
-    const PoseQualityRequest& request, ThreadPool* pool,
-    const Cancellation* cancellation) {
+    const PoseQualityRequest& request, const BindControl& control) {
   DEFORM_ASSIGN_OR_RETURN(const auto map,
                           PoseMap::Create(*binding, request.pose));
   const std::vector<int64_t> sample =
-      Sample(binding->point_count(), request.max_points);
+      Sample(binding->point_count(), PointsToMeasure(*binding, request));
   const int64_t count = std::ssize(sample);
-  std::vector<Derivative> derivatives(count);
-  const bool finished = ParallelFor(
-      pool, (count + kPointsPerBlock - 1) / kPointsPerBlock, cancellation,
-      [&](int64_t block) {
-        const int64_t first = block * kPointsPerBlock;
-        const auto points = std::span(sample).subspan(
-            first, std::min(kPointsPerBlock, count - first));
-        const auto found = map->Differentiate(points);
-        std::copy(found.begin(), found.end(), derivatives.begin() + first);
-      });
+  std::vector<Found> found(count);
+  const bool finished =
+      ParallelFor(control.pool, (count + kPointsPerBlock - 1) / kPointsPerBlock,
+                  control.cancellation, [&](int64_t block) {
+                    const int64_t first = block * kPointsPerBlock;
+                    const auto points = std::span(sample).subspan(
+                        first, std::min(kPointsPerBlock, count - first));
+                    const auto derivatives = map->Differentiate(points);
+                    for (size_t k = 0; k < points.size(); ++k) {
+                      found[first + static_cast<int64_t>(k)] = {
+                          derivatives[k].measured,
+                          QualityOf(points[k], derivatives[k].jacobian,
+                                    binding->dimension())};
+                    }
+                    if (control.points_done != nullptr) {
+                      *control.points_done += std::ssize(points);
+                    }
+                  });
   if (!finished) {
     return absl::CancelledError("the quality report was cancelled");
   }
   PoseQuality quality;
   quality.sampled = count < binding->point_count();
-  for (int64_t i = 0; i < count; ++i) {
-    switch (derivatives[i].measured) {
-      case Measured::kYes:
-        quality.points.push_back(QualityOf(sample[i], derivatives[i].jacobian,
-                                           binding->dimension()));
-        break;
-      case Measured::kNearRig:
-        ++quality.near_rig;
-        break;
-      case Measured::kFixed:
-        ++quality.fixed;
-        break;
+  for (const Found& point : found) {
+    quality.near_rig += point.measured == Measured::kNearRig;
+    quality.fixed += point.measured == Measured::kFixed;
+    if (point.measured == Measured::kYes) {
+      quality.points.push_back(point.quality);
     }
   }
   Summarise(quality);
-  MeasureVolume(binding, request.pose, pool, quality);
+  MeasureVolume(binding, request.pose, control.pool, quality);
   return quality;
 }
 

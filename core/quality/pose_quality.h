@@ -6,8 +6,6 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "core/base/cancellation.h"
-#include "core/base/thread_pool.h"
 #include "core/deform/pose.h"
 #include "core/quality/volume.h"
 #include "core/weights/binding.h"
@@ -65,10 +63,13 @@ struct PoseQualityRequest {
   int64_t max_points = 20000;
 };
 
-// On all threads of `pool`, which may be null as may `cancellation`. Cancelled.
+// Points that MeasurePose() will look at.
+int64_t PointsToMeasure(const BindingFacts& binding,
+                        const PoseQualityRequest& request);
+
+// Cancelled.
 absl::StatusOr<PoseQuality> MeasurePose(
     const std::shared_ptr<const Binding>& binding,
-    const PoseQualityRequest& request, ThreadPool* pool,
-    const Cancellation* cancellation);
+    const PoseQualityRequest& request, const BindControl& control);
 
 }  // namespace deform

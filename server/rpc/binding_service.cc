@@ -1,6 +1,7 @@
 #include "server/rpc/binding_service.h"
 
 #include <algorithm>
+#include <atomic>
 #include <future>
 #include <utility>
 
@@ -62,20 +63,35 @@ absl::StatusOr<v1::GetWeightsResponse> RowsAgain(const BindingFacts& binding,
   return rows.get();
 }
 
-// Measures with the priority of `pool`. What the task refers to is the
-// caller's, so a caller who has left is waited for: a block of points at most.
-absl::StatusOr<Quality> Measure(const QualityTask& what, ThreadPool& pool,
-                                grpc::ServerContext& context,
-                                CallRunner::Watch& watch) {
+// Measures with the priority of `pool`, telling progress. What the task refers
+// to is the caller's, so a caller who has left is waited for: a block of points
+// at most.
+absl::StatusOr<Quality> Measure(
+    const QualityTask& what, ThreadPool& pool, grpc::ServerContext& context,
+    CallRunner::Watch& watch,
+    grpc::ServerWriter<v1::GetQualityResponse>& writer) {
   Cancellation cancellation;
+  std::atomic<int64_t> points_done = 0;
   const auto task =
-      std::make_shared<std::packaged_task<absl::StatusOr<Quality>()>>(
-          [&] { return MeasureQuality(what, pool, cancellation); });
+      std::make_shared<std::packaged_task<absl::StatusOr<Quality>()>>([&] {
+        return MeasureQuality(what, {.pool = &pool,
+                                     .cancellation = &cancellation,
+                                     .points_done = &points_done});
+      });
   auto quality = task->get_future();
   pool.Submit([task] { (*task)(); });
+  auto told_at = std::chrono::steady_clock::now() - kProgressInterval;
   while (quality.wait_for(kPollInterval) != std::future_status::ready) {
     if (context.IsCancelled()) cancellation.Cancel();
     watch.Progressed();
+    const auto now = std::chrono::steady_clock::now();
+    if (!what.posed || now - told_at < kProgressInterval) continue;
+    told_at = now;
+    v1::GetQualityResponse message;
+    message.mutable_progress()->set_points_done(points_done);
+    message.mutable_progress()->set_points_total(
+        PointsToMeasure(what.facts, *what.posed));
+    if (!writer.Write(message)) cancellation.Cancel();
   }
   return quality.get();
 }
@@ -217,8 +233,9 @@ grpc::Status BindingService::GetQuality(
         return !context->IsCancelled();
       }));
     }
-    DEFORM_ASSIGN_OR_RETURN(const Quality quality,
-                            Measure(task, background_, *context, watch));
+    DEFORM_ASSIGN_OR_RETURN(
+        const Quality quality,
+        Measure(task, background_, *context, watch, *writer));
     v1::GetQualityResponse message;
     *message.mutable_report() = ToProto(quality);
     if (!writer->Write(message)) return absl::CancelledError();

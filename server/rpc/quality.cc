@@ -109,15 +109,15 @@ absl::StatusOr<QualityTask> ToQualityTask(const v1::GetQualityRequest& request,
 }
 
 absl::StatusOr<Quality> MeasureQuality(const QualityTask& task,
-                                       ThreadPool& pool,
-                                       const Cancellation& cancellation) {
+                                       const BindControl& control) {
   Quality quality{.binding = task.facts.quality()};
-  DEFORM_ASSIGN_OR_RETURN(const double distance,
-                          SmallestDistance(task.facts, &pool, &cancellation));
+  DEFORM_ASSIGN_OR_RETURN(
+      const double distance,
+      SmallestDistance(task.facts, control.pool, control.cancellation));
   quality.rig_distance_min = distance / DiagonalOf(task.facts.rig());
   if (task.posed) {
-    DEFORM_ASSIGN_OR_RETURN(quality.pose, MeasurePose(task.binding, *task.posed,
-                                                      &pool, &cancellation));
+    DEFORM_ASSIGN_OR_RETURN(quality.pose,
+                            MeasurePose(task.binding, *task.posed, control));
   }
   return quality;
 }

@@ -34,10 +34,9 @@ struct Quality {
   std::optional<PoseQuality> pose;
 };
 
-// On `pool` and the caller's thread. Cancelled.
+// Tells the points of the pose that are done. Cancelled.
 absl::StatusOr<Quality> MeasureQuality(const QualityTask& task,
-                                       ThreadPool& pool,
-                                       const Cancellation& cancellation);
+                                       const BindControl& control);
 
 v1::QualityReport ToProto(const Quality& quality);
 

@@ -139,6 +139,30 @@ TEST(QualityReport, IsRefusedWithReasons) {
       "BINDING_NOT_FOUND");
 }
 
+TEST(QualityReport, GivesUpWhenItsCallerDoes) {
+  RunningServer running;
+  // Differences of mean value coordinates in a cage of 1280 faces: seconds.
+  const ModelInfo model =
+      running.client().RegisterModel(MeshOf(Icosphere(0.5, 4)), "ball").value();
+  const BindingInfo binding =
+      running.client()
+          .CreateBinding({.model_id = model.model_id,
+                          .rig = CageOf(Icosphere(1, 3)),
+                          .scheme = "mean_value"})
+          .value();
+  int64_t total = 0;
+  const auto quality = running.client().GetQuality(
+      {.binding_id = binding.binding_id,
+       .pose = PoseUpdate{.positions = Icosphere(2, 3).positions}},
+      [&](int64_t done, int64_t all) {
+        EXPECT_LE(done, all);
+        total = all;
+        return false;
+      });
+  EXPECT_TRUE(absl::IsCancelled(quality.status())) << quality.status();
+  EXPECT_EQ(total, 2562);
+}
+
 TEST(QualityReport, DoesNotHoldSessionsUp) {
   RunningServer running;
   const BindingInfo binding = running.BindBall();

@@ -12,6 +12,7 @@
 #include "client/cli/exit_code.h"
 #include "client/cli/motion.h"
 #include "client/cli/picture_options.h"
+#include "client/cli/progress.h"
 #include "client/cli/quality_text.h"
 #include "client/cli/stage.h"
 #include "core/base/status_macros.h"
@@ -144,13 +145,16 @@ absl::StatusOr<ComparedScheme> Compare(const Options& options, Context& context,
   scheme.deformed = frame.DoublePositions();
   scheme.rig = pose.positions;
   scheme.binding = stage->binding();
+  Progress measuring(context.console, absl::StrCat("measuring ", name),
+                     &context.interruption);
   DEFORM_ASSIGN_OR_RETURN(
       scheme.quality,
       stage->client().GetQuality(
           {.binding_id = stage->binding().binding_id,
            .pose = pose,
            .max_points = std::min(stage->binding().point_count, kMostPoints),
-           .with_points = true}));
+           .with_points = true},
+          measuring.callback()));
   DEFORM_ASSIGN_OR_RETURN(scheme.values, ValuesFor(options, *stage, scheme));
   if (comparison.rest.rows() == 0 || (caged && !comparison.rest_caged)) {
     comparison.dimension = stage->binding().dimension;

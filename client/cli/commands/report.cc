@@ -10,6 +10,7 @@
 #include "client/cli/files.h"
 #include "client/cli/motion.h"
 #include "client/cli/picture_options.h"
+#include "client/cli/progress.h"
 #include "client/cli/quality_picture.h"
 #include "client/cli/quality_text.h"
 #include "client/cli/stage.h"
@@ -95,7 +96,8 @@ absl::StatusOr<std::optional<PoseUpdate>> PoseOf(const Options& options,
   return std::optional(std::move(update));
 }
 
-absl::StatusOr<QualityInfo> Measure(const Options& options, Stage& stage,
+absl::StatusOr<QualityInfo> Measure(const Options& options, Context& context,
+                                    Stage& stage,
                                     const std::optional<PoseUpdate>& pose) {
   const int64_t points = stage.binding().point_count;
   QualityQuery query{.binding_id = stage.binding().binding_id,
@@ -111,7 +113,8 @@ absl::StatusOr<QualityInfo> Measure(const Options& options, Stage& stage,
     query.max_points = std::min(points, kMostPoints);
     query.with_points = true;
   }
-  return stage.client().GetQuality(query);
+  Progress measuring(context.console, "measuring", &context.interruption);
+  return stage.client().GetQuality(query, measuring.callback());
 }
 
 absl::StatusOr<Shown> ShownOf(const Options& options, Stage& stage,
@@ -195,7 +198,7 @@ absl::Status Run(const Options& options, Context& context) {
   DEFORM_ASSIGN_OR_RETURN(const std::optional<PoseUpdate> pose,
                           PoseOf(options, *stage));
   DEFORM_ASSIGN_OR_RETURN(const QualityInfo quality,
-                          Measure(options, *stage, pose));
+                          Measure(options, context, *stage, pose));
   if (!options.png.empty()) {
     DEFORM_RETURN_IF_ERROR(Draw(options, *stage, quality, pose));
   }

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <numeric>
 #include <random>
 
@@ -19,7 +20,7 @@ PoseQuality Measure(const std::shared_ptr<const Binding>& binding,
                     const Positions& vertices, int64_t max_points = 20000) {
   return MeasurePose(binding,
                      {.pose = {.vertices = vertices}, .max_points = max_points},
-                     nullptr, nullptr)
+                     {})
       .value();
 }
 
@@ -228,13 +229,25 @@ TEST(PoseQuality, IsTheSameOnAnyNumberOfThreads) {
   const PoseQuality serial = Measure(binding, pose);
   ThreadPool pool({.threads = 5});
   const PoseQuality parallel =
-      MeasurePose(binding, {.pose = {.vertices = pose}}, &pool, nullptr)
+      MeasurePose(binding, {.pose = {.vertices = pose}}, {.pool = &pool})
           .value();
   ASSERT_EQ(serial.points.size(), parallel.points.size());
   for (size_t i = 0; i < serial.points.size(); ++i) {
     EXPECT_EQ(serial.points[i].distortion, parallel.points[i].distortion);
   }
   EXPECT_EQ(serial.distortion_p99, parallel.distortion_p99);
+}
+
+TEST(PoseQuality, TellsHowFarItIs) {
+  const Shape cube = Cuboid({-1, -1, -1}, {1, 1, 1});
+  const auto binding = BindTo("green", Icosphere(0.6, 3), CageOf(cube));
+  const PoseQualityRequest request{.pose = RestPose(binding->rig()),
+                                   .max_points = 100};
+  EXPECT_EQ(PointsToMeasure(*binding, request), 100);
+  EXPECT_EQ(PointsToMeasure(*binding, {.pose = request.pose}), 642);
+  std::atomic<int64_t> done = 0;
+  ASSERT_TRUE(MeasurePose(binding, request, {.points_done = &done}).ok());
+  EXPECT_EQ(done, 100);
 }
 
 TEST(PoseQuality, CanBeCancelled) {
@@ -244,7 +257,7 @@ TEST(PoseQuality, CanBeCancelled) {
   cancellation.Cancel();
   EXPECT_TRUE(
       absl::IsCancelled(MeasurePose(binding, {.pose = RestPose(binding->rig())},
-                                    nullptr, &cancellation)
+                                    {.cancellation = &cancellation})
                             .status()));
   EXPECT_TRUE(absl::IsCancelled(
       SmallestDistance(*binding, nullptr, &cancellation).status()));

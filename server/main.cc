@@ -9,6 +9,7 @@
 #include <string>
 #include <thread>
 
+#include "server/models/process_memory.h"
 #include "server/options.h"
 #include "server/server.h"
 
@@ -93,6 +94,7 @@ int Main(int argc, char** argv) {
     std::cout << WriteToml(line->options);
     return 0;
   }
+  ReturnLargeBlocks();
   const sigset_t signals = BlockSignals();
   SetUpLogging(line->options);
   return Serve(line->options, signals);

@@ -8,6 +8,7 @@
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
 #include "server/models/content_id.h"
+#include "server/models/process_memory.h"
 
 namespace deform::server {
 namespace {
@@ -209,12 +210,15 @@ absl::StatusOr<std::shared_ptr<const Binding>> BindingRegistry::WeightsOf(
 
 absl::Status BindingRegistry::Remove(const std::string& tenant,
                                      const std::string& id) {
-  std::shared_ptr<const BindingRecord> removed;  // Outlives the lock.
-  MutexLock lock(mutex_);
-  DEFORM_ASSIGN_OR_RETURN(removed, bindings_.Remove(tenant, id));
-  // Who waits for weights of a binding that is gone still gets them; who
-  // creates it again gets a new one.
-  jobs_.erase(Key(tenant, id));
+  {
+    std::shared_ptr<const BindingRecord> removed;  // Outlives the lock.
+    MutexLock lock(mutex_);
+    DEFORM_ASSIGN_OR_RETURN(removed, bindings_.Remove(tenant, id));
+    // Who waits for weights of a binding that is gone still gets them; who
+    // creates it again gets a new one.
+    jobs_.erase(Key(tenant, id));
+  }
+  ReturnFreedMemory();
   return absl::OkStatus();
 }
 

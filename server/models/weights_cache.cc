@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "absl/time/clock.h"
+#include "server/models/process_memory.h"
 
 namespace deform::server {
 
@@ -15,7 +16,16 @@ std::shared_ptr<WeightsCache::Slot> WeightsCache::MakeSlot() {
 }
 
 int64_t WeightsCache::Evict(int64_t missing) {
-  std::vector<std::shared_ptr<const Resident>> dropped;  // Outside the lock.
+  std::vector<std::shared_ptr<const Resident>> dropped;
+  const int64_t idle = TakeIdle(missing, dropped);
+  if (dropped.empty()) return idle;
+  dropped.clear();
+  ReturnFreedMemory();
+  return idle;
+}
+
+int64_t WeightsCache::TakeIdle(
+    int64_t missing, std::vector<std::shared_ptr<const Resident>>& taken) {
   int64_t idle = 0;
   MutexLock lock(mutex_);
   // Others get pointers only from the slot, under this lock: who holds the only
@@ -31,7 +41,7 @@ int64_t WeightsCache::Evict(int64_t missing) {
     if (missing <= 0) break;
     if (!is_idle(*slot)) continue;
     missing -= slot->resident_->memory.bytes();
-    dropped.push_back(std::move(slot->resident_));
+    taken.push_back(std::move(slot->resident_));
   }
   return idle;
 }

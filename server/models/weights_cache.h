@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <list>
 #include <memory>
+#include <vector>
 
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
@@ -76,6 +77,9 @@ class WeightsCache {
 
  private:
   int64_t Evict(int64_t missing);
+  // Out of their slots: as many as are missing, or none. Returns what all have.
+  int64_t TakeIdle(int64_t missing,
+                   std::vector<std::shared_ptr<const Resident>>& taken);
 
   MemoryBudget budget_;
   mutable Mutex mutex_;

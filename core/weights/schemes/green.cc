@@ -71,8 +71,6 @@ class GreenEvaluator final : public LaneEvaluator {
 PointState GreenEvaluator::Close(const Vec3& eta, bool touches,
                                  std::span<double> phi) const {
   const double winding = std::accumulate(phi.begin(), phi.end(), 0.0);
-  // Before the closure, which would hide it.
-  if (!(winding > -0.5 && winding < 1.5)) return PointState::kOverlap;
   const bool inside = winding > 0.5;
   const double missing = (inside ? 1 : 0) - winding;
   const PointState state = inside ? PointState::kInside : PointState::kOutside;
@@ -80,6 +78,11 @@ PointState GreenEvaluator::Close(const Vec3& eta, bool touches,
 
   const CageFaces::Nearest nearest = faces_.NearestOf(eta);
   const bool boundary = nearest.distance <= tolerance_;
+  // Before the closure, which would hide it. Within rounding of an edge, faces
+  // may be on the wrong side of the point by a whole turn.
+  if (!boundary && !(winding > -0.5 && winding < 1.5)) {
+    return PointState::kOverlap;
+  }
   for (int k = 0; k < faces_.corners(); ++k) {
     phi[faces_[nearest.face].corner[k]] +=
         (boundary ? 1 - winding : missing) * nearest.barycentric[k];

@@ -14,13 +14,15 @@ build() {
 }
 deformctl() { build/release/bin/deformctl "$@"; }
 
+# Stops the server, and takes away what was half done.
 server_pid=
-stop_server() {
+clean_up() {
   [ -n "$server_pid" ] && kill "$server_pid" 2>/dev/null && wait "$server_pid" 2>/dev/null
   [ -n "${address_pipe:-}" ] && rm -f "$address_pipe"
+  rm -f "$out"/vessel.stl.part "$out"/gmsh-doc_*.deb
   return 0
 }
-trap stop_server EXIT
+trap clean_up EXIT
 trap 'echo; echo "stopped"; exit 130' INT TERM
 
 # On a free port of this machine; deformctl finds it in DEFORM_SERVER.

@@ -4,17 +4,11 @@
 #include <cassert>
 #include <utility>
 
-#include "core/kernels/apply_weights.h"
-#include "core/kernels/weight_tiles.h"
+#include "core/weights/compress_binding.h"
 
 namespace deform {
 namespace {
 
-// Tiles that one body of a parallel loop walks: some milliseconds at most, and
-// sums that fit the second cache.
-constexpr int64_t kTilesPerBlock = 256;
-// Below this many products a loop is not worth sharing among threads.
-constexpr int64_t kParallelProducts = 1 << 18;
 // Sums gather a rounding of 1e-16 D a step; after so many they are made anew.
 constexpr int kMaxSteps = 4096;
 
@@ -26,7 +20,8 @@ Deformer::Deformer(std::shared_ptr<const Binding> binding, ThreadPool* pool)
       posed_columns_(binding_->rig(), binding_->scheme().uses_normals()),
       pose_(RestPose(binding_->rig())),
       columns_(posed_columns_.rest()),
-      displacement_(binding_->weights().tiles() * kTileSums, 0.0) {
+      sums_(WeightedSums::Create(*binding_)) {
+  if (binding_->compressed() != nullptr) pose_bounds_ = PoseBounds(*binding_);
   if (!binding_->fixed_points().empty()) {
     fixed_.assign(binding_->point_count(), 0);
     for (const int64_t point : binding_->fixed_points()) fixed_[point] = 1;
@@ -51,11 +46,16 @@ Deformer::Change Deformer::Begin(const Pose& pose, Path path) {
     map_ = FitSimilarity(RestVertices(binding_->rig()), pose_.vertices,
                          binding_->dimension());
     steps_since_full_ = 0;
+    for (int64_t c = 0; c < columns_.rows(); ++c) {
+      const Vec3 residual = Residual(columns_, c);
+      change.values.insert(change.values.end(), residual.begin(),
+                           residual.end());
+    }
     return change;
   }
   for (const int32_t c : change.columns) {
     for (int d = 0; d < 3; ++d) {
-      change.deltas.push_back(next(c, d) - columns_(c, d));
+      change.values.push_back(next(c, d) - columns_(c, d));
     }
   }
   columns_ = std::move(next);
@@ -74,7 +74,18 @@ DeformReport Deformer::Report(const Change& change) const {
     report.exit_mismatch =
         ExitMismatch(*cage, binding_->exit_parts(), posed_columns_, columns_);
   }
+  if (const CompressedWeights* compressed = binding_->compressed()) {
+    report.error_bound = compressed->bound() * LargestResidual();
+  }
   return report;
+}
+
+double Deformer::LargestResidual() const {
+  double largest = 0;
+  for (int64_t c = 0; c < columns_.rows(); ++c) {
+    largest = std::max(largest, Residual(columns_, c).norm() / pose_bounds_[c]);
+  }
+  return largest;
 }
 
 // The residual of column c: v' - T v, or s n' - A n.
@@ -112,117 +123,59 @@ bool Deformer::PrefersFull(const std::vector<int32_t>& changed,
   return false;
 }
 
-Vec3 Deformer::PointAt(int64_t point) const {
-  const Vec3 rest = binding_->model()->positions().row(point).transpose();
-  if (!fixed_.empty() && fixed_[point]) return rest;
-  const double* sums = displacement_.data() + point / kTilePoints * kTileSums +
-                       point % kTilePoints;
-  return map_(rest) + Vec3(sums[0], sums[kTilePoints], sums[2 * kTilePoints]);
+template <typename Body>
+void Deformer::ForEachPoint(int64_t first, int64_t count, Body body) const {
+  constexpr int64_t kPoints = 256;
+  double displacements[kPoints * 3];
+  for (int64_t at = 0; at < count; at += kPoints) {
+    const int64_t some = std::min(kPoints, count - at);
+    sums_->Copy(first + at, some, displacements);
+    for (int64_t i = 0; i < some; ++i) {
+      const int64_t point = first + at + i;
+      const Vec3 rest = binding_->model()->positions().row(point).transpose();
+      const bool fixed = !fixed_.empty() && fixed_[point];
+      body(at + i, fixed ? rest
+                         : Vec3(map_(rest) +
+                                Eigen::Map<const Vec3>(displacements + 3 * i)));
+    }
+  }
 }
 
 Positions Deformer::positions() const {
   Positions all(binding_->point_count(), 3);
-  for (int64_t i = 0; i < all.rows(); ++i) all.row(i) = PointAt(i).transpose();
+  ForEachPoint(0, all.rows(), [&](int64_t i, const Vec3& point) {
+    all.row(i) = point.transpose();
+  });
   return all;
 }
 
 void Deformer::CopyRelative(int64_t first, int64_t count, const Vec3& origin,
                             float* out) const {
   const int dimension = binding_->dimension();
-  for (int64_t i = 0; i < count; ++i) {
-    const Vec3 relative = PointAt(first + i) - origin;
+  ForEachPoint(first, count, [&](int64_t i, const Vec3& point) {
     for (int d = 0; d < dimension; ++d) {
-      out[i * dimension + d] = static_cast<float>(relative(d));
+      out[i * dimension + d] = static_cast<float>(point(d) - origin(d));
     }
-  }
+  });
 }
-
-// The sums of several deformers of one binding, in one walk over its weights.
-class JointPass {
- public:
-  explicit JointPass(const WeightTiles& weights) : weights_(weights) {}
-
-  void Add(Deformer& deformer, const Deformer::Change& change) {
-    if (change.full) {
-      full_.push_back(&deformer);
-    } else if (!change.columns.empty()) {
-      stepping_.emplace_back(&deformer, &change);
-    }
-  }
-
-  void Run(ThreadPool* pool) {
-    if (full_.empty() && stepping_.empty()) return;
-    PackResiduals();
-    const int64_t tiles = weights_.tiles();
-    const int64_t blocks = (tiles + kTilesPerBlock - 1) / kTilesPerBlock;
-    const int64_t products = tiles * kTilePoints * weights_.columns();
-    const auto block = [&](int64_t b) {
-      const int64_t first = b * kTilesPerBlock;
-      const int64_t count = std::min(kTilesPerBlock, tiles - first);
-      ApplyAll(first, count);
-      ApplyChanges(first, count);
-    };
-    if (pool != nullptr && blocks > 1 && products > kParallelProducts) {
-      pool->ParallelFor(blocks, nullptr, block);
-    } else {
-      for (int64_t b = 0; b < blocks; ++b) block(b);
-    }
-  }
-
- private:
-  void PackResiduals() {
-    residuals_.reserve(weights_.columns() * full_.size() * 3);
-    for (int64_t c = 0; c < weights_.columns(); ++c) {
-      for (const Deformer* deformer : full_) {
-        const Vec3 residual = deformer->Residual(deformer->columns_, c);
-        for (int d = 0; d < 3; ++d) {
-          residuals_.push_back(static_cast<float>(residual(d)));
-        }
-      }
-    }
-  }
-
-  void ApplyAll(int64_t first, int64_t count) const {
-    const auto sets = static_cast<int64_t>(full_.size());
-    if (sets == 0) return;
-    std::vector<float> sums(count * sets * kTileSums);
-    ApplyTiles(weights_.tile(first), count, weights_.columns(), sets,
-               residuals_.data(), sums.data());
-    for (int64_t s = 0; s < sets; ++s) {
-      for (int64_t t = 0; t < count; ++t) {
-        std::copy_n(sums.data() + (t * sets + s) * kTileSums, kTileSums,
-                    full_[s]->displacement_.data() + (first + t) * kTileSums);
-      }
-    }
-  }
-
-  void ApplyChanges(int64_t first, int64_t count) const {
-    for (const auto& [deformer, change] : stepping_) {
-      AddTileColumns(weights_.tile(first), count, weights_.columns(),
-                     change->columns.data(),
-                     static_cast<int64_t>(change->columns.size()),
-                     change->deltas.data(),
-                     deformer->displacement_.data() + first * kTileSums);
-    }
-  }
-
-  const WeightTiles& weights_;
-  std::vector<Deformer*> full_;
-  std::vector<float> residuals_;  // columns x full_ x 3
-  std::vector<std::pair<Deformer*, const Deformer::Change*>> stepping_;
-};
 
 void MoveTogether(std::span<DeformJob> jobs, ThreadPool* pool) {
   if (jobs.empty()) return;
+  const Binding& binding = jobs.front().deformer->binding();
   std::vector<Deformer::Change> changes;
-  changes.reserve(jobs.size());  // The pass points to them.
-  JointPass pass(jobs.front().deformer->binding().weights());
+  std::vector<SumsChange> of_sums;
+  changes.reserve(jobs.size());  // The changes of the sums point into it.
   for (DeformJob& job : jobs) {
-    assert(&job.deformer->binding() == &jobs.front().deformer->binding());
-    changes.push_back(job.deformer->Begin(*job.pose, job.path));
-    pass.Add(*job.deformer, changes.back());
+    assert(&job.deformer->binding() == &binding);
+    const Deformer::Change& change =
+        changes.emplace_back(job.deformer->Begin(*job.pose, job.path));
+    if (!change.full && change.columns.empty()) continue;
+    of_sums.push_back({.sums = job.deformer->sums_.get(),
+                       .full = change.full,
+                       .columns = change.columns,
+                       .values = change.values});
   }
-  pass.Run(pool);
+  ApplyChanges(binding, of_sums, pool);
   for (size_t k = 0; k < jobs.size(); ++k) {
     jobs[k].report = jobs[k].deformer->Report(changes[k]);
   }

@@ -3,9 +3,10 @@
 //   x = T eta + sum phi (v' - T v) + sum psi (s n' - A n)
 //
 // with T = (A, t) the similarity that fits the pose best, applied in double. So
-// the rest pose and rigid motion are exact, and float errors scale with the
-// deformation that is left. Source: [L08] Eq. 9 in displacement form, exact
-// because the weights reproduce eta and their vertex part sums to 1.
+// the rest pose and rigid motion are exact, and the errors of float and of
+// compressed weights scale with the deformation that is left. Source: [L08] Eq.
+// 9 in displacement form, exact because the weights reproduce eta and their
+// vertex part sums to 1.
 #pragma once
 
 #include <cstdint>
@@ -17,6 +18,7 @@
 #include "core/deform/affine_map.h"
 #include "core/deform/columns.h"
 #include "core/deform/pose.h"
+#include "core/deform/weighted_sums.h"
 #include "core/weights/binding.h"
 
 namespace deform {
@@ -29,6 +31,10 @@ struct DeformReport {
   // How far crossed faces deviate from the similarity of their exit face; see
   // ExitMismatch().
   double exit_mismatch = 0;
+  // How far compression may have moved any point, in model units: the bound of
+  // the weights times the largest displacement of a column from the best
+  // similarity, in its R_c (compress_binding.h). 0 with dense weights.
+  double error_bound = 0;
 };
 
 struct DeformJob;
@@ -60,14 +66,13 @@ class Deformer {
 
  private:
   friend void MoveTogether(std::span<DeformJob> jobs, ThreadPool* pool);
-  friend class JointPass;
 
-  // What a step does to the sums: adds columns x deltas, or, if full, makes
-  // them anew.
+  // What a step does to the sums: adds columns x values, or, if full, makes
+  // them anew from the residuals of all columns.
   struct Change {
     bool full = false;
     std::vector<int32_t> columns;
-    std::vector<double> deltas;  // 3 a column.
+    std::vector<double> values;  // 3 a column.
   };
 
   // Everything of a step but the sums.
@@ -79,18 +84,23 @@ class Deformer {
   bool PrefersFull(const std::vector<int32_t>& changed,
                    const Columns& next) const;
   Vec3 Residual(const Columns& columns, int64_t c) const;
-  Vec3 PointAt(int64_t point) const;
+  // Of all columns of the pose, in units of R_c.
+  double LargestResidual() const;
+  // Calls body(i, point) for points [first, first + count).
+  template <typename Body>
+  void ForEachPoint(int64_t first, int64_t count, Body body) const;
 
   const std::shared_ptr<const Binding> binding_;
   ThreadPool* const pool_;
   const PosedColumns posed_columns_;
-  std::vector<char> fixed_;  // N, or empty if no point stays at rest.
+  std::vector<char> fixed_;          // N, or empty if no point stays at rest.
+  std::vector<double> pose_bounds_;  // R_c; empty with dense weights.
 
   Pose pose_;
   Columns columns_;  // Of pose_.
   AffineMap map_;    // T, as of the last full pass.
   int steps_since_full_ = 0;
-  std::vector<double> displacement_;  // tiles x kTileSums: the sums above.
+  const std::unique_ptr<WeightedSums> sums_;  // Of the residuals.
 };
 
 // One step of one of several sessions.

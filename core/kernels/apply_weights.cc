@@ -137,7 +137,8 @@ void AddTileColumns(const float* tiles, int64_t count, int64_t columns,
       }
     }
     for (int64_t k = 0; k < changed; ++k) {
-      const float* weights = tile + int64_t{index[k]} * kTilePoints;
+      const float* weights =
+          tile + (index != nullptr ? int64_t{index[k]} : k) * kTilePoints;
       if (t + 1 < count) hwy::Prefetch(weights + columns * kTilePoints);
       for (int v = 0; v < kDoubleVectors; ++v) {
         const Doubles w = hn::PromoteTo(

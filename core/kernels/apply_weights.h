@@ -27,7 +27,7 @@ void ApplyTiles(const float* tiles, int64_t count, int64_t columns,
 //       sum over k of tiles[(t * columns + index[k]) * 16 + i] * delta[k * 3 +
 //       d]
 // Double, because these sums are kept over many steps; few columns are bound by
-// memory, not by arithmetic.
+// memory, not by arithmetic. `index` may be null: the first `changed` columns.
 void AddTileColumns(const float* tiles, int64_t count, int64_t columns,
                     const int32_t* index, int64_t changed, const double* delta,
                     double* out);

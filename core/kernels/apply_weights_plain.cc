@@ -25,7 +25,8 @@ void AddTileColumnsPlain(const float* tiles, int64_t count, int64_t columns,
                          const double* delta, double* out) {
   for (int64_t t = 0; t < count; ++t) {
     for (int64_t k = 0; k < changed; ++k) {
-      const float* weights = tiles + (t * columns + index[k]) * kTilePoints;
+      const int64_t c = index != nullptr ? index[k] : k;
+      const float* weights = tiles + (t * columns + c) * kTilePoints;
       for (int64_t d = 0; d < 3; ++d) {
         for (int64_t i = 0; i < kTilePoints; ++i) {
           out[t * kTileSums + d * kTilePoints + i] +=

@@ -4,10 +4,9 @@
 
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <limits>
-#include <memory>
-#include <span>
+
+#include "core/kernels/zeroed_array.h"
 
 namespace deform {
 
@@ -21,53 +20,55 @@ inline float RoundedWeight(double weight) {
                              static_cast<float>(weight > 0 ? 1 : -1));
 }
 
-// `points` x `columns` float weights, 64-byte aligned, zero where not set. The
-// last tile is padded with points of weight 0.
-class WeightTiles {
+// `points` x `columns` numbers, 64-byte aligned, zero where not set. The last
+// tile is padded with points of zeros.
+template <typename Number>
+class Tiles {
  public:
-  WeightTiles() = default;
-  WeightTiles(int64_t points, int64_t columns);
+  Tiles() = default;
+  Tiles(int64_t points, int64_t columns)
+      : points_(points),
+        columns_(columns),
+        data_(TilesOf(points) * columns * kTilePoints) {}
+
+  static int64_t TilesOf(int64_t points) {
+    return (points + kTilePoints - 1) / kTilePoints;
+  }
 
   int64_t points() const { return points_; }
   int64_t columns() const { return columns_; }
-  int64_t tiles() const { return (points_ + kTilePoints - 1) / kTilePoints; }
-  int64_t bytes() const { return BytesFor(points_, columns_); }
+  int64_t tiles() const { return TilesOf(points_); }
+  int64_t bytes() const { return data_.bytes(); }
   static int64_t BytesFor(int64_t points, int64_t columns) {
-    return (points + kTilePoints - 1) / kTilePoints * kTilePoints * columns *
-           int64_t{sizeof(float)};
+    return TilesOf(points) * kTilePoints * columns * int64_t{sizeof(Number)};
   }
 
-  // columns x 16 floats.
-  const float* tile(int64_t t) const { return data_.get() + Offset(t); }
-  float* tile(int64_t t) { return data_.get() + Offset(t); }
+  // columns x 16 numbers.
+  const Number* tile(int64_t t) const { return data_.data() + Offset(t); }
+  Number* tile(int64_t t) { return data_.data() + Offset(t); }
 
-  float at(int64_t point, int64_t column) const {
+  Number at(int64_t point, int64_t column) const {
     return tile(point /
                 kTilePoints)[column * kTilePoints + point % kTilePoints];
   }
   // Different points of different tiles may be set from different threads.
-  void set(int64_t point, int64_t column, float value) {
+  void set(int64_t point, int64_t column, Number value) {
     tile(point / kTilePoints)[column * kTilePoints + point % kTilePoints] =
         value;
   }
-  // Sets all weights of a point to 0.
+  // Sets all numbers of a point to 0.
   void Clear(int64_t point) {
     for (int64_t c = 0; c < columns_; ++c) set(point, c, 0);
   }
 
  private:
-  // Of the block in which the tiles lie aligned.
-  struct Free {
-    Free() : block(nullptr) {}
-    explicit Free(void* b) : block(b) {}
-    void operator()(float* /*data*/) const { std::free(block); }
-    void* block;
-  };
   int64_t Offset(int64_t t) const { return t * columns_ * kTilePoints; }
 
   int64_t points_ = 0;
   int64_t columns_ = 0;
-  std::unique_ptr<float[], Free> data_;
+  ZeroedArray<Number> data_;
 };
+
+using WeightTiles = Tiles<float>;
 
 }  // namespace deform

@@ -17,6 +17,7 @@
 #include "core/kernels/measure_weights.h"
 #include "core/weights/blocks.h"
 #include "core/weights/cage_faces.h"
+#include "core/weights/compress_binding.h"
 #include "core/weights/unbindable.h"
 
 namespace deform {
@@ -63,9 +64,20 @@ class Binder {
   const Positions& points() const { return request_.model->positions(); }
   // False if cancelled.
   bool ForEach(int64_t count, absl::FunctionRef<void(int64_t)> body) const;
+  // Where the weights of a block are written: among those of all points, or,
+  // if these are not kept, for the block alone.
+  struct Rows {
+    WeightTiles* kept = nullptr;
+    WeightTiles own;
+    int64_t first = 0;  // Point of row 0.
+    WeightTiles& tiles() { return kept != nullptr ? *kept : own; }
+  };
+  Rows RowsOf(Block at);
+  TileBlock Evaluate(Block at, Rows& rows) const;
   // Measures the points of a block that `wanted` names.
-  void Measure(Block at, absl::FunctionRef<bool(int64_t point)> wanted,
-               Figures& figures);
+  void Measure(Block at, Rows& rows,
+               absl::FunctionRef<bool(int64_t point)> wanted,
+               Figures& figures) const;
   void EvaluateBlock(Block at);
   void ExtendBlock(Block at);
   void Report(const Figures& figures, int64_t points_done)
@@ -99,10 +111,10 @@ Binder::Binder(const BindRequest& request, const BindControl& control,
       evaluator_(evaluator),
       parts_(parts),
       weights_(weights),
-      block_points_(BlockPoints(weights.columns())),
+      block_points_(BlockPoints(parts.columns)),
       center_(BoxOf(RestVertices(request.rig)).center()),
       diagonal_(DiagonalOf(request.rig)),
-      rest_(weights.columns(), 3),
+      rest_(parts.columns, 3),
       states_(request.model->size()),
       exit_faces_(request.model->size(), -1) {
   const Positions& vertices = RestVertices(request.rig);
@@ -119,22 +131,36 @@ bool Binder::ForEach(int64_t count,
   return ParallelFor(control_.pool, count, control_.cancellation, body);
 }
 
-void Binder::Measure(Block at, absl::FunctionRef<bool(int64_t)> wanted,
-                     Figures& figures) {
+Binder::Rows Binder::RowsOf(Block at) {
+  if (request_.weight_tolerance == 0) return {.kept = &weights_};
+  return {.own = WeightTiles(at.count, rest_.rows()), .first = at.first};
+}
+
+TileBlock Binder::Evaluate(Block at, Rows& rows) const {
+  TileBlock block{.tiles =
+                      rows.tiles().tile((at.first - rows.first) / kTilePoints)};
+  evaluator_.EvaluateTiles(points().middleRows(at.first, at.count), block);
+  return block;
+}
+
+void Binder::Measure(Block at, Rows& rows,
+                     absl::FunctionRef<bool(int64_t)> wanted,
+                     Figures& figures) const {
   const int64_t vertices = RestVertices(request_.rig).rows();
   TileMeasures measures;
   int64_t measured = -1;  // Tile.
   for (int64_t i = at.first; i < at.first + at.count; ++i) {
     if (!wanted(i)) continue;
-    const int64_t tile = i / kTilePoints, lane = i % kTilePoints;
+    const int64_t row = i - rows.first;
+    const int64_t tile = row / kTilePoints, lane = row % kTilePoints;
     if (tile != measured) {
-      MeasureTile(weights_.tile(tile), rest_.rows(), vertices, rest_.data(),
+      MeasureTile(rows.tiles().tile(tile), rest_.rows(), vertices, rest_.data(),
                   measures);
       measured = tile;
     }
     if (!std::isfinite(measures.vertex_sum[lane] + measures.normal_sum[lane])) {
       figures.too_large.push_back(i);
-      weights_.Clear(i);
+      rows.tiles().Clear(row);
       continue;
     }
     const Vec3 x(measures.position[0][lane], measures.position[1][lane],
@@ -152,13 +178,13 @@ void Binder::Measure(Block at, absl::FunctionRef<bool(int64_t)> wanted,
 }
 
 void Binder::EvaluateBlock(Block at) {
-  TileBlock block{.tiles = weights_.tile(at.first / kTilePoints)};
-  evaluator_.EvaluateTiles(points().middleRows(at.first, at.count), block);
+  Rows rows = RowsOf(at);
+  const TileBlock block = Evaluate(at, rows);
   std::copy(block.states.begin(), block.states.end(),
             states_.begin() + at.first);
   Figures figures;
   const auto bound = [&](int64_t i) { return IsBound(states_[i]); };
-  Measure(at, bound, figures);
+  Measure(at, rows, bound, figures);
   for (int64_t i = 0; i < std::ssize(block.iterations); ++i) {
     if (!bound(at.first + i)) continue;
     figures.tally.AddSearch(block.iterations[i], block.residuals[i]);
@@ -211,23 +237,26 @@ void Binder::AssignExits() {
 }
 
 void Binder::ExtendBlock(Block at) {
+  Rows rows = RowsOf(at);
+  if (rows.kept == nullptr) Evaluate(at, rows);
   int64_t done = 0;
   for (int64_t i = at.first; i < at.first + at.count; ++i) {
     if (states_[i] != PointState::kOutside) continue;
     ++done;
+    const int64_t row = i - rows.first;
     if (exit_faces_[i] < 0) {
-      weights_.Clear(i);
+      rows.tiles().Clear(row);
       continue;
     }
     for (const WeightShare& share :
          evaluator_.Extend(points().row(i), exit_faces_[i])) {
-      const double weight = weights_.at(i, share.column);
-      weights_.set(i, share.column, RoundedWeight(weight + share.weight));
+      const double weight = rows.tiles().at(row, share.column);
+      rows.tiles().set(row, share.column, RoundedWeight(weight + share.weight));
     }
   }
   Figures figures;
   Measure(
-      at, [&](int64_t i) { return exit_faces_[i] >= 0; }, figures);
+      at, rows, [&](int64_t i) { return exit_faces_[i] >= 0; }, figures);
   Report(figures, done);
 }
 
@@ -329,7 +358,20 @@ void Binder::Finish() {
   parts_.quality = figures_.tally.quality();
 }
 
+absl::Status CheckTolerance(double tolerance) {
+  if (tolerance == 0 ||
+      (tolerance >= kFinestTolerance && tolerance <= kCoarsestTolerance)) {
+    return absl::OkStatus();
+  }
+  return InvalidInput(
+      "WEIGHT_TOLERANCE_OUT_OF_RANGE", "weight_tolerance",
+      absl::StrCat("weight tolerance must be 0 (dense weights) or in [",
+                   kFinestTolerance, ", ", kCoarsestTolerance, "], not ",
+                   tolerance));
+}
+
 absl::Status CheckFits(const BindRequest& request) {
+  DEFORM_RETURN_IF_ERROR(CheckTolerance(request.weight_tolerance));
   if (request.model->dimension() != DimensionOf(request.rig)) {
     return InvalidInput(
         "DIMENSION_MISMATCH", "rig",
@@ -364,7 +406,9 @@ absl::StatusOr<std::shared_ptr<const Binding>> Bind(
   const int64_t columns = Columns(request.rig, scheme->uses_normals());
   BindingFacts::Parts parts{
       .request = request, .scheme = scheme, .columns = columns};
-  auto weights = std::make_shared<WeightTiles>(request.model->size(), columns);
+  const bool dense = request.weight_tolerance == 0;
+  auto weights =
+      std::make_shared<WeightTiles>(dense ? request.model->size() : 0, columns);
   Binder binder(request, control, *evaluator, parts, *weights);
   DEFORM_RETURN_IF_ERROR(binder.EvaluateAll());
   DEFORM_RETURN_IF_ERROR(binder.CheckOverlap());
@@ -372,8 +416,11 @@ absl::StatusOr<std::shared_ptr<const Binding>> Bind(
   DEFORM_RETURN_IF_ERROR(binder.ExtendOutside());
   binder.Finish();
   parts.compute_seconds = SecondsSince(start);
-  return std::make_shared<const Binding>(BindingFacts(std::move(parts)),
-                                         std::move(weights));
+  BindingFacts facts(std::move(parts));
+  if (!dense) {
+    return CompressBinding(facts, nullptr, request.weight_tolerance, control);
+  }
+  return std::make_shared<const Binding>(std::move(facts), std::move(weights));
 }
 
 }  // namespace deform

@@ -132,6 +132,22 @@ int64_t BindingFacts::bytes() const {
   return numbers * int64_t{sizeof(double)} + indices * int64_t{sizeof(int32_t)};
 }
 
+void Binding::CopyWeights(int64_t first, int64_t count, float* out) const {
+  if (compressed_) {
+    compressed_->CopyRows(first, count, out);
+    return;
+  }
+  for (int64_t i = first; i < first + count; ++i) {
+    for (int64_t c = 0; c < column_count(); ++c) *out++ = weights_->at(i, c);
+  }
+}
+
+std::shared_ptr<const Binding> Binding::WithFacts(BindingFacts facts) const {
+  return compressed_
+             ? std::make_shared<const Binding>(std::move(facts), compressed_)
+             : std::make_shared<const Binding>(std::move(facts), weights_);
+}
+
 absl::StatusOr<WeightBlock> RecomputeWeights(const BindingFacts& binding,
                                              int64_t first, int64_t count) {
   const int64_t n = binding.point_count();

@@ -16,6 +16,7 @@
 #include "core/mesh/mesh.h"
 #include "core/mesh/rig.h"
 #include "core/weights/bind_quality.h"
+#include "core/weights/compressed_weights.h"
 #include "core/weights/exit_regions.h"
 #include "core/weights/scheme.h"
 
@@ -30,6 +31,10 @@ struct BindRequest {
   SchemeOptions options;
   ExitRegions exits;
   Unbindable unbindable = Unbindable::kFail;
+  // 0: dense weights. Else they are compressed to this (compress_binding.h),
+  // cluster by cluster, so that the dense ones never exist at once; they are
+  // computed twice.
+  double weight_tolerance = 0;
 };
 
 // How a computation reports and is stopped. All may be null.
@@ -99,19 +104,33 @@ class Binding : public BindingFacts {
   // N x C; rows of unbound points are 0.
   Binding(BindingFacts facts, std::shared_ptr<const WeightTiles> weights)
       : BindingFacts(std::move(facts)), weights_(std::move(weights)) {}
+  Binding(BindingFacts facts, std::shared_ptr<const CompressedWeights> weights)
+      : BindingFacts(std::move(facts)), compressed_(std::move(weights)) {}
 
+  // Only if they are dense.
   const WeightTiles& weights() const { return *weights_; }
-  const std::shared_ptr<const WeightTiles>& shared_weights() const {
-    return weights_;
+  // Null if they are dense.
+  const CompressedWeights* compressed() const { return compressed_.get(); }
+
+  int64_t weight_bytes() const {
+    return compressed_ ? compressed_->bytes() : weights_->bytes();
   }
+  // Weights of points [first, first + count) by rows, count x C, in either
+  // form.
+  void CopyWeights(int64_t first, int64_t count, float* out) const;
+  // The same weights for other facts, such as those of an equal binding.
+  std::shared_ptr<const Binding> WithFacts(BindingFacts facts) const;
 
  private:
+  // One of these.
   std::shared_ptr<const WeightTiles> weights_;
+  std::shared_ptr<const CompressedWeights> compressed_;
 };
 
 // Computes the weights, tile by tile, on all threads of the pool. Errors:
 //   NotFound UNKNOWN_SCHEME; InvalidArgument WRONG_RIG, INVALID_OPTION,
-//   DIMENSION_MISMATCH, those of CheckExitRegions, CAGE_OVERLAPPING
+//   DIMENSION_MISMATCH, WEIGHT_TOLERANCE_OUT_OF_RANGE, those of
+//   CheckExitRegions, CAGE_OVERLAPPING
 //   FailedPrecondition EXTERIOR_NO_EXIT_FACE, EXIT_AMBIGUOUS, OUTSIDE_HULL,
 //     NOT_CONVERGED, WEIGHT_TOO_LARGE (for float) with Unbindable::kFail: says
 //     how many, names the first ten

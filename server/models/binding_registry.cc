@@ -263,14 +263,14 @@ absl::StatusOr<CreatedBinding> BindingRegistry::Compute(Job& job) try {
       bind_(*job.request, {.pool = &pool_,
                            .cancellation = &job.cancellation,
                            .points_done = &job.points_done}));
-  auto weights = memory.Split(computed->weights().bytes());
+  auto weights = memory.Split(computed->weight_bytes());
   if (job.known != nullptr) {
     // The facts stay the record's: one copy, and figures that do not change.
-    auto binding = std::make_shared<const Binding>(job.known->facts,
-                                                   computed->shared_weights());
     return CreatedBinding{
         job.known,
-        job.known->weights->Put(std::move(binding), std::move(weights)), true};
+        job.known->weights->Put(computed->WithFacts(job.known->facts),
+                                std::move(weights)),
+        true};
   }
   DEFORM_RETURN_IF_ERROR(memory.Resize(computed->bytes(), "the binding needs"));
   const auto record = std::make_shared<const BindingRecord>(

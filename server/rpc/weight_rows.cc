@@ -68,12 +68,9 @@ int64_t PointsPerMessage(const BindingFacts& binding,
 v1::GetWeightsResponse CachedRows(const Binding& binding,
                                   const PointRange& range) {
   auto rows = Header(binding, range, v1::WEIGHT_PRECISION_CACHED_FLOAT32);
-  const WeightTiles& weights = binding.weights();
-  std::vector<float> row(weights.columns());
-  for (int64_t p = range.first; p < range.first + range.count; ++p) {
-    for (int64_t c = 0; c < weights.columns(); ++c) row[c] = weights.at(p, c);
-    Append(row.data(), weights.columns(), rows.mutable_data());
-  }
+  std::vector<float> weights(range.count * binding.column_count());
+  binding.CopyWeights(range.first, range.count, weights.data());
+  Append(weights.data(), std::ssize(weights), rows.mutable_data());
   return rows;
 }
 

@@ -1,0 +1,65 @@
+#include "core/deform/compressed_sums.h"
+
+#include <algorithm>
+
+#include "absl/functional/function_ref.h"
+#include "core/kernels/apply_weights.h"
+
+namespace deform {
+namespace {
+
+// Below this many points a loop is not worth sharing among threads.
+constexpr int64_t kParallelPoints = 10000;
+
+}  // namespace
+
+CompressedSums::CompressedSums(const CompressedWeights& weights)
+    : weights_(weights),
+      top_(weights.top_size(), 0.0),
+      sums_(weights.slot_count() * 3, 0.0F) {}
+
+void CompressedSums::Copy(int64_t first, int64_t count, double* out) const {
+  for (int64_t i = first; i < first + count; ++i) {
+    const int64_t slot = weights_.slot(i);
+    const float* tile =
+        sums_.data() + slot / kTilePoints * kTileSums + slot % kTilePoints;
+    for (int64_t d = 0; d < 3; ++d) {
+      *out++ = slot < 0 ? 0.0 : tile[d * kTilePoints];
+    }
+  }
+}
+
+void CompressedSums::Apply(const CompressedWeights& weights,
+                           std::span<const SumsChange> changes,
+                           ThreadPool* pool) {
+  const auto sums_of = [](const SumsChange& change) {
+    return static_cast<CompressedSums*>(change.sums);
+  };
+  const auto in_parallel = [&](int64_t count,
+                               absl::FunctionRef<void(int64_t)> body) {
+    if (pool != nullptr && weights.slot_count() > kParallelPoints) {
+      pool->ParallelFor(count, nullptr, body);
+    } else {
+      for (int64_t i = 0; i < count; ++i) body(i);
+    }
+  };
+  for (const SumsChange& change : changes) {
+    if (change.full) std::ranges::fill(sums_of(change)->top_, 0.0);
+  }
+  in_parallel(weights.cluster_count(), [&](int64_t cluster) {
+    for (const SumsChange& change : changes) {
+      weights.AddToTop(
+          cluster, change.full ? nullptr : change.columns.data(),
+          change.full ? weights.columns() : std::ssize(change.columns),
+          change.values.data(), sums_of(change)->top_.data());
+    }
+  });
+  in_parallel(weights.branch_count(), [&](int64_t branch) {
+    for (const SumsChange& change : changes) {
+      weights.ApplyBranch(branch, sums_of(change)->top_.data(),
+                          sums_of(change)->sums_.data());
+    }
+  });
+}
+
+}  // namespace deform

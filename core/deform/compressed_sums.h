@@ -1,0 +1,27 @@
+// Sums over compressed weights.
+#pragma once
+
+#include <vector>
+
+#include "core/deform/weighted_sums.h"
+
+namespace deform {
+
+// Keeps the sums of the coarsest level in double, which follow moved columns
+// alone; those of the points are made from them at every change.
+class CompressedSums : public WeightedSums {
+ public:
+  explicit CompressedSums(const CompressedWeights& weights);
+  void Copy(int64_t first, int64_t count, double* out) const override;
+
+  // The sums of all changes are CompressedSums.
+  static void Apply(const CompressedWeights& weights,
+                    std::span<const SumsChange> changes, ThreadPool* pool);
+
+ private:
+  const CompressedWeights& weights_;
+  std::vector<double> top_;
+  std::vector<float> sums_;  // By slot, in tiles.
+};
+
+}  // namespace deform

@@ -1,0 +1,38 @@
+// Sum over c of w_ic x_c for all points i of a model: what a session keeps of
+// its pose, whatever the form of the weights.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "core/base/thread_pool.h"
+#include "core/weights/binding.h"
+
+namespace deform {
+
+// The sums of one session. Starts at 0. Not thread-safe.
+class WeightedSums {
+ public:
+  static std::unique_ptr<WeightedSums> Create(const Binding& binding);
+  virtual ~WeightedSums() = default;
+
+  // Of points [first, first + count): 3 numbers each.
+  virtual void Copy(int64_t first, int64_t count, double* out) const = 0;
+};
+
+// A change of the sums of one session.
+struct SumsChange {
+  WeightedSums* sums = nullptr;
+  // Replaces the sums by weights x values; else adds to them.
+  bool full = false;
+  std::span<const int32_t> columns;  // If not full: which; else all.
+  std::span<const double> values;    // 3 a column.
+};
+
+// Makes all changes, of different sums of this binding, in one walk over its
+// weights. `pool` may be null.
+void ApplyChanges(const Binding& binding, std::span<const SumsChange> changes,
+                  ThreadPool* pool);
+
+}  // namespace deform

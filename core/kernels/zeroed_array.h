@@ -1,0 +1,51 @@
+// Memory that vectors load well.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <memory>
+#include <new>
+
+namespace deform {
+
+// `size` zeros, at an address divisible by 64. Large ones cost nothing until
+// they are written: calloc() leaves the zeroing to the system, page by page as
+// threads first touch them.
+template <typename Number>
+class ZeroedArray {
+ public:
+  static constexpr size_t kAlignment = 64;
+
+  ZeroedArray() = default;
+  explicit ZeroedArray(int64_t size) : size_(size) {
+    if (size == 0) return;
+    const size_t wanted = static_cast<size_t>(size) * sizeof(Number);
+    size_t space = wanted + kAlignment;
+    void* block = std::calloc(space, 1);
+    if (block == nullptr) throw std::bad_alloc();
+    void* aligned = block;
+    std::align(kAlignment, wanted, aligned, space);
+    data_ = std::unique_ptr<Number[], Free>(static_cast<Number*>(aligned),
+                                            Free(block));
+  }
+
+  int64_t size() const { return size_; }
+  int64_t bytes() const { return size_ * int64_t{sizeof(Number)}; }
+  const Number* data() const { return data_.get(); }
+  Number* data() { return data_.get(); }
+
+ private:
+  // Of the block in which the numbers lie aligned.
+  struct Free {
+    Free() : block(nullptr) {}
+    explicit Free(void* b) : block(b) {}
+    void operator()(Number* /*data*/) const { std::free(block); }
+    void* block;
+  };
+
+  int64_t size_ = 0;
+  std::unique_ptr<Number[], Free> data_;
+};
+
+}  // namespace deform

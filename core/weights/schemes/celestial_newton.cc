@@ -5,12 +5,14 @@
 #include <limits>
 #include <utility>
 
+#include <Eigen/Eigenvalues>
+
 namespace deform {
 namespace {
 
 constexpr double kTargetResidual = 1e-15;
-// Above it the search goes on in long double.
-constexpr double kWideResidual = 1e-12;
+// Above it the search goes on in long double, along other axes.
+constexpr double kWideResidual = 2e-13;
 // Below these residuals a search that has not halved its residual in so many
 // steps has met the rounding floor.
 constexpr double kDeepFloor = 1e-13;
@@ -18,6 +20,11 @@ constexpr int kDeepPatience = 1;
 constexpr double kShallowFloor = 1e-4;
 constexpr int kShallowPatience = 5;
 constexpr int kMaxSteps = 120;
+constexpr int kMaxTurns = 3;
+// In Newton steps; on the way to the hull these are too short by far.
+constexpr double kLongestStep = 64;
+// A fall of the potential by this part of its terms is no rounding.
+constexpr double kFall = 1e-11;
 // exp(600) can still be summed and cubed roots of it multiplied.
 constexpr double kMaxExponent = 600;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -29,6 +36,15 @@ template <class Real>
 double ExponentIn(const Directions& q, int64_t i, const Vector<Real>& y) {
   return static_cast<double>(q.x[i] * y.x() + q.y[i] * y.y() + q.z[i] * y.z());
 }
+
+// The same directions along other axes, in which the Hessian is written: next
+// to a face or an edge of the hull, and among handles that are seen in nearly
+// one direction, its condition is beyond all digits; along its own axes the
+// thin ones keep theirs.
+struct Turned {
+  Eigen::Matrix3d axes;  // Rows.
+  Directions q;
+};
 
 // Phi and its derivatives at a point y, and what else one pass can tell.
 struct Moments {
@@ -42,9 +58,10 @@ struct Moments {
   double residual() const { return gradient.norm() / beta_sum; }
 };
 
+// The Hessian is that of the directions `h`.
 template <class Potential, class Real>
-Moments MomentsAt(const Directions& q, const Potential& potential,
-                  const Vector<Real>& y) {
+Moments MomentsAt(const Directions& q, const Directions& h,
+                  const Potential& potential, const Vector<Real>& y) {
   Moments m;
   for (int64_t i = 0; i < q.size(); ++i) {
     const double u = ExponentIn(q, i, y);
@@ -53,14 +70,14 @@ Moments MomentsAt(const Directions& q, const Potential& potential,
     m.magnitude += std::abs(terms.value);
     m.beta_sum += terms.beta;
     m.gradient += terms.beta * q.q(i);
-    const double cx = terms.curvature * q.x[i];
-    const double cy = terms.curvature * q.y[i];
-    m.xx += cx * q.x[i];
-    m.xy += cx * q.y[i];
-    m.xz += cx * q.z[i];
-    m.yy += cy * q.y[i];
-    m.yz += cy * q.z[i];
-    m.zz += terms.curvature * q.z[i] * q.z[i];
+    const double cx = terms.curvature * h.x[i];
+    const double cy = terms.curvature * h.y[i];
+    m.xx += cx * h.x[i];
+    m.xy += cx * h.y[i];
+    m.xz += cx * h.z[i];
+    m.yy += cy * h.y[i];
+    m.yz += cy * h.z[i];
+    m.zz += terms.curvature * h.z[i] * h.z[i];
     m.largest_exponent = std::max(m.largest_exponent, u);
   }
   return m;
@@ -104,15 +121,16 @@ Vec3 SolveSemidefinite(const Eigen::Matrix3d& matrix, const Vec3& b) {
   return scale.cwiseProduct(x);
 }
 
-Vec3 NewtonStep(const Moments& m) {
+Eigen::Matrix3d HessianOf(const Moments& m) {
   Eigen::Matrix3d hessian;
   hessian << m.xx, m.xy, m.xz, m.xy, m.yy, m.yz, m.xz, m.yz, m.zz;
-  return SolveSemidefinite(hessian, -m.gradient);
+  return hessian;
 }
 
 // How far one may go along `step`.
 struct Reach {
-  double length = 1;      // The largest exponent stays below kMaxExponent.
+  // The largest exponent stays below kMaxExponent.
+  double length = kLongestStep;
   bool separates = true;  // q_i . step < 0 for all i.
 };
 
@@ -133,14 +151,16 @@ Reach ReachOf(const Directions& q, const Vector<Real>& y, const Vec3& step) {
 template <class Potential, class Real>
 class Descent {
  public:
-  Descent(const Directions& q, const Potential& potential,
+  // `turned` may be null.
+  Descent(const Directions& q, const Turned* turned, const Potential& potential,
           const Vector<Real>& start)
       : q_(q),
+        turned_(turned),
         potential_(potential),
         y_(Vector<Real>::Zero()),
-        now_(MomentsAt(q, potential, y_)) {
+        now_(At(y_)) {
     if (start.isZero(0) || !start.allFinite()) return;
-    const Moments other = MomentsAt(q_, potential_, start);
+    const Moments other = At(start);
     if (!(other.value < now_.value)) return;
     y_ = start;
     now_ = other;
@@ -149,6 +169,7 @@ class Descent {
   NewtonSolution Run() {
     NewtonSolution best{.residual = kInfinity};
     double milestone = kInfinity;  // Residual at the last halving.
+    double fallen_to = kInfinity;  // Potential at the last true fall.
     int waited = 0;
     for (int steps = 0; steps <= kMaxSteps; ++steps) {
       const double residual = now_.residual();
@@ -161,11 +182,16 @@ class Descent {
       if (now_.largest_exponent < 0) {
         return Separated(y_.template cast<double>(), best);
       }
-      waited = residual <= 0.5 * milestone ? 0 : waited + 1;
-      if (waited == 0) milestone = residual;
+      // Among directions of different scales the residual may rise for long
+      // while the potential falls.
+      const bool falls = now_.value < fallen_to - kFall * now_.magnitude;
+      const bool halved = residual <= 0.5 * milestone;
+      waited = halved || falls ? 0 : waited + 1;
+      if (halved) milestone = residual;
+      if (falls) fallen_to = now_.value;
       if (waited >= kDeepPatience && best.residual < kDeepFloor) break;
       if (waited >= kShallowPatience && best.residual < kShallowFloor) break;
-      const Vec3 step = NewtonStep(now_);
+      const Vec3 step = NewtonStep();
       if (!step.allFinite() || step.isZero(0)) break;
       const Reach reach = ReachOf(q_, y_, step);
       if (reach.separates) return Separated(step, best);
@@ -175,46 +201,111 @@ class Descent {
   }
 
  private:
+  Moments At(const Vector<Real>& y) const {
+    return MomentsAt(q_, turned_ != nullptr ? turned_->q : q_, potential_, y);
+  }
+
+  Vec3 NewtonStep() const {
+    if (turned_ == nullptr) {
+      return SolveSemidefinite(HessianOf(now_), -now_.gradient);
+    }
+    const Vec3 along =
+        SolveSemidefinite(HessianOf(now_), turned_->axes * -now_.gradient);
+    return turned_->axes.transpose() * along;
+  }
+
   static NewtonSolution Separated(const Vec3& by, NewtonSolution best) {
     best.separator = by;
     return best;
   }
 
-  // Backtracks from `length` until the potential falls enough. Where rounding
-  // hides the fall of the potential, the slope decides.
-  bool Advance(const Vec3& step, double length) {
+  // Backtracks from the whole step until the potential falls enough. Where
+  // rounding hides the fall of the potential, the slope decides. Where the
+  // whole step leaves much of the slope, goes further, up to `longest`.
+  bool Advance(const Vec3& step, double longest) {
     const double slope = now_.gradient.dot(step);
+    double length = std::min(1.0, longest);
     for (int halvings = 0; halvings < 60; ++halvings, length *= 0.5) {
       const Vector<Real> y = y_ + (length * step).template cast<Real>();
-      const Moments next = MomentsAt(q_, potential_, y);
+      const Moments next = At(y);
       const bool falls = next.value <= now_.value + 1e-4 * length * slope;
       const bool flattens = next.gradient.dot(step) <= 0.1 * std::abs(slope) &&
                             next.value <= now_.value + 1e-12 * now_.magnitude;
       if (falls || flattens) {
-        y_ = y;
+        const Vector<Real> from = std::exchange(y_, y);
         now_ = next;
+        if (halvings == 0) GoFurther(from, step, slope, length, longest);
         return true;
       }
     }
     return false;
   }
 
+  void GoFurther(const Vector<Real>& from, const Vec3& step, double slope,
+                 double length, double longest) {
+    while (now_.gradient.dot(step) < 0.1 * slope && 2 * length <= longest) {
+      length *= 2;
+      const Vector<Real> y = from + (length * step).template cast<Real>();
+      const Moments next = At(y);
+      if (!(next.value < now_.value)) return;
+      y_ = y;
+      now_ = next;
+    }
+  }
+
   const Directions& q_;
+  const Turned* const turned_;
   const Potential& potential_;
   Vector<Real> y_;
   Moments now_;
 };
 
+// Along the axes of the Hessian at y. A subspace without a component keeps
+// having none.
+template <class Potential>
+Turned TurnedAt(const Directions& q, const Potential& potential,
+                const WideVec3& y) {
+  const Moments m = MomentsAt(q, q, potential, y);
+  Turned turned{Eigen::Matrix3d::Identity(), q};
+  const Eigen::Matrix3d hessian = HessianOf(m) / (m.xx + m.yy + m.zz);
+  if (!hessian.allFinite()) return turned;
+  if (m.zz == 0) {
+    const double angle = 0.5 * std::atan2(2 * m.xy, m.xx - m.yy);
+    turned.axes.topLeftCorner<2, 2>() << std::cos(angle), std::sin(angle),
+        -std::sin(angle), std::cos(angle);
+  } else {
+    turned.axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(hessian)
+                      .eigenvectors()
+                      .transpose();
+  }
+  for (int64_t i = 0; i < q.size(); ++i) {
+    const Vec3 along = turned.axes * q.q(i);
+    turned.q.x[i] = along.x();
+    turned.q.y[i] = along.y();
+    turned.q.z[i] = along.z();
+  }
+  return turned;
+}
+
 template <class Potential>
 NewtonSolution MinimizeIn(const Directions& q, const Potential& potential,
                           const WideVec3& start) {
-  const NewtonSolution plain =
-      Descent<Potential, double>(q, potential, start.cast<double>()).Run();
-  if (plain.separated() || plain.residual <= kWideResidual) return plain;
-  NewtonSolution wide =
-      Descent<Potential, long double>(q, potential, plain.y).Run();
-  wide.iterations += plain.iterations;
-  return wide;
+  NewtonSolution best =
+      Descent<Potential, double>(q, nullptr, potential, start.cast<double>())
+          .Run();
+  for (int turn = 0; turn < kMaxTurns; ++turn) {
+    if (best.separated() || best.residual <= kWideResidual) break;
+    const Turned turned = TurnedAt(q, potential, best.y);
+    NewtonSolution next =
+        Descent<Potential, long double>(q, &turned, potential, best.y).Run();
+    next.iterations += best.iterations;
+    if (!next.separated() && !(next.residual < best.residual)) {
+      best.iterations = next.iterations;
+      break;
+    }
+    best = next;
+  }
+  return best;
 }
 
 }  // namespace

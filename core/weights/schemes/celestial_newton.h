@@ -47,8 +47,8 @@ inline double Exponent(const Directions& q, int64_t i, const WideVec3& y) {
 // start. Stops at a residual of 1e-15, or when it no longer falls; the best
 // iterate is returned, whether good enough or not. O(n) a step.
 //
-// Works in double, and goes on with exponents from long double where that ends
-// above 1e-12.
+// Works in double. Where that ends above 2e-13, goes on with exponents from long
+// double and the Hessian along its own axes.
 NewtonSolution Minimize(const Directions& directions,
                         const ExponentialPotential& potential,
                         const WideVec3& start);

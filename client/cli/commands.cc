@@ -4,6 +4,7 @@
 #define DEFORM_COMMANDS(X) \
   X(Register)              \
   X(Bind)                  \
+  X(Handles)               \
   X(Deform)                \
   X(Play)                  \
   X(List)                  \

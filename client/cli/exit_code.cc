@@ -28,8 +28,8 @@ constexpr Hint kHints[] = {
      "faces are counted from 0, as triangles: a polygon of k corners in the "
      "file counts as k - 2 of them, in its place"},
     {"OUTSIDE_HULL",
-     "add handles around the model, such as the corners of its enlarged "
-     "bounding box, or leave these points with --unbindable report"},
+     "use --add-box for fixed handles around the model, add some of your own, "
+     "or leave these points with --unbindable report"},
     {"NOT_CONVERGED", "leave these points with --unbindable report"},
     {"CAGE_OVERLAPPING",
      "pull the parts of the cage apart; faces are counted from 0, as "

@@ -100,6 +100,7 @@ Json ToJson(const BindingInfo& binding) {
           {"dimension", binding.dimension},
           {"point_count", binding.point_count},
           {"vertex_count", binding.vertex_count},
+          {"fixed_handle_count", binding.fixed_handle_count},
           {"normal_count", binding.normal_count},
           {"rig_diagonal", binding.rig_diagonal},
           {"weight_bytes", binding.weight_bytes},
@@ -112,6 +113,8 @@ Json ToJson(const BindingInfo& binding) {
           {"quality", ToJson(binding.quality)},
           {"unbound_count", binding.unbound_count},
           {"unbound", unbound},
+          {"clamped_count", binding.clamped_count},
+          {"clamped", binding.clamped},
           {"exit_parts", parts},
           {"warnings", binding.warnings},
           {"create_time", TimeText(binding.create_time)}};
@@ -154,10 +157,14 @@ void Describe(const BindingInfo& binding, std::ostream& out) {
   properties.Add("points",
                  absl::StrFormat("%s in %dD", Thousands(binding.point_count),
                                  binding.dimension));
+  std::string fixed;
+  if (binding.fixed_handle_count > 0) {
+    fixed = Thousands(binding.fixed_handle_count) + " fixed handles, ";
+  }
   properties.Add(
       "rig",
-      absl::StrFormat("%s vertices, %s normals, diagonal %.6g",
-                      Thousands(binding.vertex_count),
+      absl::StrFormat("%s vertices, %s%s normals, diagonal %.6g",
+                      Thousands(binding.vertex_count), fixed,
                       Thousands(binding.normal_count), binding.rig_diagonal));
   properties.Add("weights", absl::StrFormat("%s, computed in %s",
                                             Bytes(binding.weight_bytes),
@@ -202,6 +209,11 @@ void Describe(const BindingInfo& binding, std::ostream& out) {
         "not bound",
         absl::StrFormat("%s points (%s): %s", Thousands(group.points.size()),
                         group.reason, FirstOf(group.points, 10)));
+  }
+  if (binding.clamped_count > 0) {
+    properties.Add("clamped", absl::StrFormat("%s points: %s",
+                                              Thousands(binding.clamped_count),
+                                              FirstOf(binding.clamped, 10)));
   }
   for (const std::string& warning : binding.warnings) {
     properties.Add("warning", warning);

@@ -33,7 +33,8 @@ class Player {
       }
       if (!WaitForRoom()) return absl::OkStatus();
       // The receiver knows why, if the stream has ended.
-      if (!stream_.Send(update).ok()) return absl::OkStatus();
+      // Poses are made for the rig as it was at the beginning.
+      if (!stream_.Send(update, 0).ok()) return absl::OkStatus();
     }
     return absl::OkStatus();
   }

@@ -32,16 +32,32 @@ absl::StatusOr<ExitRegions> LoadExitPerPoint(const std::string& path) {
 }
 
 // A list, "0,0.5,2", or else a file.
-absl::StatusOr<std::vector<double>> ParseWeights(const std::string& text) {
-  std::vector<double> weights;
-  if (text.empty()) return weights;
+absl::StatusOr<std::vector<double>> ParseNumbers(const std::string& text) {
+  std::vector<double> numbers;
+  if (text.empty()) return numbers;
   for (const absl::string_view word :
        absl::StrSplit(absl::string_view(text), ',')) {
-    double weight = 0;
-    if (!absl::SimpleAtod(word, &weight)) return LoadNumbers(text);
-    weights.push_back(weight);
+    double number = 0;
+    if (!absl::SimpleAtod(word, &number)) return LoadNumbers(text);
+    numbers.push_back(number);
   }
-  return weights;
+  return numbers;
+}
+
+// A list of points, or a file of them.
+absl::StatusOr<std::vector<int64_t>> ParsePoints(const std::string& text) {
+  DEFORM_ASSIGN_OR_RETURN(const std::vector<double> numbers,
+                          ParseNumbers(text));
+  std::vector<int64_t> points;
+  for (size_t i = 0; i < numbers.size(); ++i) {
+    if (!(numbers[i] >= 0 && numbers[i] < 1e15) ||
+        numbers[i] != std::floor(numbers[i])) {
+      return UsageError(absl::StrCat("--clamp: entry ", i, " (", numbers[i],
+                                     ") is not the number of a point"));
+    }
+    points.push_back(static_cast<int64_t>(numbers[i]));
+  }
+  return points;
 }
 
 }  // namespace
@@ -83,7 +99,17 @@ void RigOptions::AddTo(CLI::App& app, bool both) {
                    "and report them")
       ->check(CLI::IsMember({"fail", "report"}))
       ->capture_default_str();
+  group
+      ->add_option("--clamp", clamp,
+                   "Points of the model that stay at rest whatever the pose, "
+                   "as list or file; they may lie outside of the rig")
+      ->type_name("LIST|FILE");
   group->add_flag("--flip-cage", flip_cage, "Turn an inside-out cage");
+  group
+      ->add_flag("--add-box", add_box,
+                 "Also the corners of the model's box, 1.6 times as large, as "
+                 "handles that stay fixed: then the model lies inside them")
+      ->needs(handles_option);
   group
       ->add_option("--handle-weights", handle_weights,
                    "t_cc: weight s >= 0 of each handle, as list or file")
@@ -136,7 +162,8 @@ absl::StatusOr<BindingSpec> LoadSpec(const RigOptions& options, int dimension) {
   BindingSpec spec;
   DEFORM_ASSIGN_OR_RETURN(spec.exits, ParseExits(options.exit));
   DEFORM_ASSIGN_OR_RETURN(spec.options.handle_weights,
-                          ParseWeights(options.handle_weights));
+                          ParseNumbers(options.handle_weights));
+  DEFORM_ASSIGN_OR_RETURN(spec.clamped, ParsePoints(options.clamp));
   DEFORM_ASSIGN_OR_RETURN(const MeshFile file,
                           LoadMesh(path, ToFileDimension(dimension)));
   if (caged) {
@@ -155,6 +182,7 @@ absl::StatusOr<BindingSpec> LoadSpec(const RigOptions& options, int dimension) {
   spec.unbindable =
       options.unbindable == "report" ? Unbindable::kReport : Unbindable::kFail;
   spec.flip_inside_out = options.flip_cage;
+  spec.add_box_handles = options.add_box && !caged;
   return spec;
 }
 

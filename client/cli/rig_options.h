@@ -19,7 +19,9 @@ struct RigOptions {
   std::string exit;
   std::string exit_per_point;
   std::string unbindable = "fail";
+  std::string clamp;
   bool flip_cage = false;
+  bool add_box = false;
   std::string handle_weights;
   double lambda = 0;
   int dimension = 0;  // 0: as the files say.

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/mesh/mesh.h"
 #include "core/mesh/rig.h"
@@ -46,13 +47,16 @@ struct RigArrays {
                   cage.faces()) {}
   // NOLINTNEXTLINE(google-explicit-constructor)
   RigArrays(const Handles& handles)
-      : RigArrays(RigKind::kHandles, handles.dimension(), handles.positions(),
-                  Faces()) {}
+      : RigArrays(RigKind::kHandles, handles.dimension(),
+                  handles.positions().topRows(handles.free_count()), Faces()) {
+    fixed = handles.positions().bottomRows(handles.fixed_count());
+  }
 
   RigKind kind = RigKind::kCage;
   int dimension = 3;
   Positions vertices;  // V x 3; the third column is not sent in 2D.
   Faces faces;         // F x dimension.
+  Positions fixed;     // Rows x 3: handles that no pose moves.
 };
 
 // How a model is to be bound.
@@ -66,6 +70,11 @@ struct BindingSpec {
   Unbindable unbindable = Unbindable::kFail;
   // Turn an inside-out cage instead of refusing it.
   bool flip_inside_out = false;
+  // Handles: also the corners of the model's box, 1.6 times as large, as fixed
+  // handles. Then the whole model lies inside their hull.
+  bool add_box_handles = false;
+  // Points that stay at rest whatever the pose.
+  std::vector<int64_t> clamped;
 };
 
 }  // namespace deform

@@ -199,6 +199,38 @@ absl::StatusOr<BindingInfo> Client::CreateBinding(
   return *std::move(info);
 }
 
+absl::StatusOr<EditedBinding> Client::EditHandles(
+    absl::string_view binding_id, std::span<const HandleEdit> edits,
+    const EditOptions& options, const ProgressCallback& progress) {
+  DEFORM_ASSIGN_OR_RETURN(const BindingInfo before, GetBinding(binding_id));
+  v1::EditHandlesRequest request;
+  request.set_tenant(impl_->options.tenant);
+  request.set_binding_id(before.binding_id);
+  for (const HandleEdit& edit : edits) {
+    *request.add_edits() = ToProto(edit, before.dimension);
+  }
+  request.mutable_session_ids()->Add(options.sessions.begin(),
+                                     options.sessions.end());
+  request.set_keep_sessions(options.keep_sessions);
+  grpc::ClientContext context;
+  const auto call = impl_->bindings->EditHandles(&context, request);
+  v1::EditHandlesResponse response;
+  std::optional<EditedBinding> edited;
+  while (call->Read(&response)) {
+    if (response.has_edited()) {
+      edited = FromProto(response.edited());
+    } else if (response.has_progress() && progress &&
+               !progress(
+                   static_cast<int64_t>(response.progress().points_done()),
+                   static_cast<int64_t>(response.progress().points_total()))) {
+      context.TryCancel();
+    }
+  }
+  DEFORM_RETURN_IF_ERROR(FromGrpc(call->Finish()));
+  if (!edited) return absl::InternalError("the server ended without a binding");
+  return *std::move(edited);
+}
+
 absl::StatusOr<BindingInfo> Client::GetBinding(absl::string_view binding_id) {
   DEFORM_ASSIGN_OR_RETURN(const v1::GetBindingResponse response,
                           impl_->GetBinding(binding_id, false));

@@ -21,6 +21,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,7 @@
 #include "client/cpp/arrays.h"
 #include "client/cpp/deform_stream.h"
 #include "client/cpp/info.h"
+#include "core/weights/handle_edit.h"
 
 namespace deform {
 
@@ -74,6 +76,11 @@ struct QualityQuery {
 // Cancelled.
 using ProgressCallback = std::function<bool(int64_t done, int64_t total)>;
 
+struct EditOptions {
+  std::vector<std::string> sessions;  // Those that move; empty: all.
+  bool keep_sessions = false;         // None moves.
+};
+
 // Thread-safe: one client serves all threads. Cheap to copy; copies share a
 // connection, which comes back by itself when the server does.
 class Client {
@@ -95,6 +102,12 @@ class Client {
   // Returns when the weights are computed, or at once if they are there.
   absl::StatusOr<BindingInfo> CreateBinding(
       const BindingSpec& spec, const ProgressCallback& progress = {});
+  // Adds, moves at rest and removes handles of a binding: computes the binding
+  // of the edited handles and has sessions move over to it, all of the old one
+  // or those that are named. If the edited rig is refused, nothing changes.
+  absl::StatusOr<EditedBinding> EditHandles(
+      absl::string_view binding_id, std::span<const HandleEdit> edits,
+      const EditOptions& options = {}, const ProgressCallback& progress = {});
   absl::StatusOr<BindingInfo> GetBinding(absl::string_view binding_id);
   // The rig of a binding at rest.
   absl::StatusOr<RigArrays> GetRig(absl::string_view binding_id);

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "absl/strings/str_cat.h"
+#include "client/cpp/status.h"
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
 
@@ -95,6 +96,7 @@ v1::Rig ToProto(const RigArrays& rig) {
     v1::Handles& handles = *proto.mutable_handles();
     handles.set_dimension(static_cast<uint32_t>(rig.dimension));
     AppendRows(rig.vertices, columns, handles.mutable_positions());
+    AppendRows(rig.fixed, columns, handles.mutable_fixed_positions());
     return proto;
   }
   v1::Cage& cage = *proto.mutable_cage();
@@ -222,6 +224,10 @@ BindingInfo FromProto(const v1::Binding& binding) {
       .compute_seconds = binding.compute_seconds(),
       .quality = FromProto(binding.quality()),
       .unbound_count = static_cast<int64_t>(binding.unbound_count()),
+      .clamped_count = static_cast<int64_t>(binding.clamped_count()),
+      .clamped = {binding.clamped_points().begin(),
+                  binding.clamped_points().end()},
+      .fixed_handle_count = binding.fixed_handle_count(),
       .warnings = {binding.warnings().begin(), binding.warnings().end()},
       .create_time = FromProto(binding.create_time()),
       .existed = binding.existed()};
@@ -238,6 +244,25 @@ BindingInfo FromProto(const v1::Binding& binding) {
                            part.crossed_faces().end()}});
   }
   return info;
+}
+
+EditedBinding FromProto(const v1::HandlesEdited& edited) {
+  EditedBinding result{
+      .binding = FromProto(edited.binding()),
+      .previous = {edited.previous_handles().begin(),
+                   edited.previous_handles().end()},
+      .iterations_mean = edited.iterations_mean(),
+      .iterations_mean_before = edited.iterations_mean_before()};
+  for (const v1::SessionMoved& moved : edited.moved()) {
+    result.moved.push_back({.session_id = moved.session_id(),
+                            .revision = moved.revision(),
+                            .largest_jump = moved.largest_jump()});
+  }
+  for (const v1::SessionNotMoved& session : edited.not_moved()) {
+    result.not_moved.emplace_back(session.session_id(),
+                                  FromRpcStatus(session.status()));
+  }
+  return result;
 }
 
 SessionInfo FromProto(const v1::Session& session) {
@@ -263,6 +288,9 @@ absl::StatusOr<RigArrays> FromProto(const v1::Rig& rig) {
     arrays.dimension = static_cast<int>(rig.handles().dimension());
     DEFORM_ASSIGN_OR_RETURN(
         arrays.vertices, ReadRows(rig.handles().positions(), arrays.dimension));
+    DEFORM_ASSIGN_OR_RETURN(
+        arrays.fixed,
+        ReadRows(rig.handles().fixed_positions(), arrays.dimension));
     return arrays;
   }
   if (!rig.has_cage()) return BadAnswer("no rig");
@@ -317,6 +345,24 @@ absl::StatusOr<JoinedSession> FromProto(const v1::Joined& joined) {
   return result;
 }
 
+absl::StatusOr<RigChange> FromProto(const v1::RigChanged& changed,
+                                    int dimension) {
+  RigChange change{.binding_id = changed.binding_id(),
+                   .revision = changed.revision(),
+                   .vertex_count = changed.vertex_count(),
+                   .previous = {changed.previous_vertices().begin(),
+                                changed.previous_vertices().end()},
+                   .largest_jump = changed.largest_jump()};
+  DEFORM_ASSIGN_OR_RETURN(change.pose.vertices,
+                          ReadRows(changed.pose(), dimension));
+  change.pose.stretch_blend = changed.stretch_blend();
+  if (change.pose.vertices.rows() != change.vertex_count ||
+      std::ssize(change.previous) != change.vertex_count) {
+    return BadAnswer("rig_changed");
+  }
+  return change;
+}
+
 v1::CreateBindingRequest ToProto(const BindingSpec& spec,
                                  const std::string& tenant) {
   v1::CreateBindingRequest request;
@@ -332,12 +378,39 @@ v1::CreateBindingRequest ToProto(const BindingSpec& spec,
                              ? v1::UNBINDABLE_REPORT
                              : v1::UNBINDABLE_FAIL);
   request.set_flip_inside_out(spec.flip_inside_out);
+  request.set_add_box_handles(spec.add_box_handles);
+  request.mutable_clamped_points()->Add(spec.clamped.begin(),
+                                        spec.clamped.end());
   return request;
 }
 
-v1::Pose ToProto(const PoseUpdate& update, int dimension, uint64_t sequence) {
+v1::HandleEdit ToProto(const HandleEdit& edit, int dimension) {
+  v1::HandleEdit proto;
+  const auto handle = static_cast<uint32_t>(edit.handle);
+  const Positions place = edit.position.transpose();
+  switch (edit.kind) {
+    case HandleEdit::Kind::kAdd:
+      AppendRows(place, Columns(dimension),
+                 proto.mutable_add()->mutable_position());
+      proto.mutable_add()->set_weight(edit.weight);
+      break;
+    case HandleEdit::Kind::kMove:
+      proto.mutable_move()->set_handle(handle);
+      AppendRows(place, Columns(dimension),
+                 proto.mutable_move()->mutable_position());
+      break;
+    case HandleEdit::Kind::kRemove:
+      proto.mutable_remove()->set_handle(handle);
+      break;
+  }
+  return proto;
+}
+
+v1::Pose ToProto(const PoseUpdate& update, int dimension, uint64_t sequence,
+                 uint64_t rig_changes) {
   v1::Pose pose;
   pose.set_sequence(sequence);
+  pose.set_rig_changes(rig_changes);
   for (const int32_t vertex : update.vertices) {
     pose.add_vertices(static_cast<uint32_t>(vertex));
   }

@@ -16,6 +16,7 @@ ModelInfo FromProto(const v1::Model& model);
 BindQuality FromProto(const v1::BindingQuality& quality);
 BindingInfo FromProto(const v1::Binding& binding);
 QualityInfo FromProto(const v1::QualityReport& report);
+EditedBinding FromProto(const v1::HandlesEdited& edited);
 SessionInfo FromProto(const v1::Session& session);
 SchemeInfo FromProto(const v1::Scheme& scheme);
 
@@ -23,6 +24,8 @@ SchemeInfo FromProto(const v1::Scheme& scheme);
 absl::StatusOr<RigArrays> FromProto(const v1::Rig& rig);
 absl::StatusOr<WeightRows> FromProto(const v1::GetWeightsResponse& weights);
 absl::StatusOr<JoinedSession> FromProto(const v1::Joined& joined);
+absl::StatusOr<RigChange> FromProto(const v1::RigChanged& changed,
+                                    int dimension);
 
 // Adds to the points of the pose. InvalidArgument (BAD_ANSWER) if the numbers
 // do not fit together.
@@ -31,7 +34,9 @@ absl::Status AddPoints(const v1::QualityPoints& points, QualityInfo& info);
 // `tenant` and `model_id` included.
 v1::CreateBindingRequest ToProto(const BindingSpec& spec,
                                  const std::string& tenant);
-v1::Pose ToProto(const PoseUpdate& update, int dimension, uint64_t sequence);
+v1::HandleEdit ToProto(const HandleEdit& edit, int dimension);
+v1::Pose ToProto(const PoseUpdate& update, int dimension, uint64_t sequence,
+                 uint64_t rig_changes = 0);
 
 // The bytes of a model as the upload holds them: doubles, then corners.
 class ModelBytes {

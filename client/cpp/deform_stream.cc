@@ -57,12 +57,14 @@ void DeformStream::Impl::Close() {
   closed_ = true;
 }
 
-absl::StatusOr<uint64_t> DeformStream::Impl::Send(const PoseUpdate& update) {
+absl::StatusOr<uint64_t> DeformStream::Impl::Send(const PoseUpdate& update,
+                                                  uint64_t rig_changes) {
   if (closed_) {
     return absl::FailedPreconditionError("no pose can follow Close()");
   }
   v1::DeformRequest request;
-  *request.mutable_pose() = ToProto(update, joined_.dimension, ++sequence_);
+  *request.mutable_pose() =
+      ToProto(update, joined_.dimension, ++sequence_, rig_changes);
   if (!call_->Write(request)) {
     return absl::UnavailableError(
         "the stream has ended; receiving tells the reason");
@@ -81,7 +83,19 @@ absl::Status DeformStream::Impl::NextFrame(Frame& frame) {
           in_band_ = complete.status();
           return End();
         }
-        if (*complete) return absl::OkStatus();
+        if (!*complete) break;
+        told_changes_ = rig_changes_.size();
+        return absl::OkStatus();
+      }
+      case v1::DeformResponse::kRigChanged: {
+        absl::StatusOr<RigChange> change =
+            FromProto(response_.rig_changed(), joined_.dimension);
+        if (!change.ok()) {
+          context_.TryCancel();
+          in_band_ = change.status();
+          return End();
+        }
+        rig_changes_.push_back(*std::move(change));
         break;
       }
       case v1::DeformResponse::kRejected:
@@ -119,7 +133,14 @@ DeformStream::~DeformStream() = default;
 
 const JoinedSession& DeformStream::joined() const { return impl_->joined(); }
 absl::StatusOr<uint64_t> DeformStream::Send(const PoseUpdate& update) {
-  return impl_->Send(update);
+  return impl_->Send(update, impl_->told_changes());
+}
+absl::StatusOr<uint64_t> DeformStream::Send(const PoseUpdate& update,
+                                            uint64_t rig_changes) {
+  return impl_->Send(update, rig_changes);
+}
+const std::vector<RigChange>& DeformStream::rig_changes() const {
+  return impl_->rig_changes();
 }
 absl::Status DeformStream::NextFrame(Frame& frame) {
   return impl_->NextFrame(frame);

@@ -46,6 +46,21 @@ struct Frame {
   Positions DoublePositions() const;
 };
 
+// The session has moved to a binding of edited handles: from now on poses have
+// its rows.
+struct RigChange {
+  std::string binding_id;
+  uint64_t revision = 0;     // Of the first frame with it.
+  int64_t vertex_count = 0;  // Rows of a pose.
+  // Of each of them: which row it was before, or -1 for a new handle.
+  std::vector<int32_t> previous;
+  // As it is: handles that stay have kept their places, new ones and those that
+  // were moved at rest are where the pose before has carried them.
+  Pose pose;
+  // How far the change moved any point of the model, in units of D.
+  double largest_jump = 0;
+};
+
 // What the server told at joining.
 struct JoinedSession {
   std::string session_id;
@@ -78,7 +93,13 @@ class DeformStream {
   // Sends a pose, whole or in part, and returns its sequence number, counted
   // from 1. Blocks while the connection is full. An error means that the stream
   // has ended, and NextFrame() tells why, or that Close() was called.
+  //
+  // The pose is meant for the rig as it is after the first `rig_changes`
+  // changes; without them, after all that NextFrame() has told. Who sends on a
+  // thread of its own says for how many its poses are made. A pose for an older
+  // rig is taken over to the present one, handle by handle.
   absl::StatusOr<uint64_t> Send(const PoseUpdate& update);
+  absl::StatusOr<uint64_t> Send(const PoseUpdate& update, uint64_t rig_changes);
 
   // Waits for the next frame and puts it into `frame`, whose memory is reused.
   // The first shows the session as it is at joining. Otherwise returns
@@ -87,6 +108,10 @@ class DeformStream {
   //     ended() is false, and the stream goes on
   //   the error that ended the stream; ended() is true
   absl::Status NextFrame(Frame& frame);
+
+  // How the rig has changed since joining, as of the last frame; part of the
+  // receiving side.
+  const std::vector<RigChange>& rig_changes() const;
 
   uint64_t rejected_sequence() const;
   bool ended() const;

@@ -3,6 +3,7 @@
 
 #include <grpcpp/client_context.h>
 
+#include <atomic>
 #include <memory>
 #include <optional>
 
@@ -22,7 +23,9 @@ class DeformStream::Impl {
   absl::Status Join(const v1::Join& join);
 
   const JoinedSession& joined() const { return joined_; }
-  absl::StatusOr<uint64_t> Send(const PoseUpdate& update);
+  absl::StatusOr<uint64_t> Send(const PoseUpdate& update, uint64_t rig_changes);
+  uint64_t told_changes() const { return told_changes_; }
+  const std::vector<RigChange>& rig_changes() const { return rig_changes_; }
   absl::Status NextFrame(Frame& frame);
   uint64_t rejected_sequence() const { return rejected_sequence_; }
   bool ended() const { return ended_; }
@@ -38,6 +41,9 @@ class DeformStream::Impl {
       call_;
   JoinedSession joined_;
 
+  // How many of rig_changes_ the caller of NextFrame() knows of.
+  std::atomic<uint64_t> told_changes_{0};
+
   // The sending thread's.
   uint64_t sequence_ = 0;
   bool closed_ = false;
@@ -46,6 +52,7 @@ class DeformStream::Impl {
   std::optional<FrameAssembler> assembler_;
   v1::DeformResponse response_;  // Kept for its buffers.
   uint64_t rejected_sequence_ = 0;
+  std::vector<RigChange> rig_changes_;
   absl::Status in_band_;
   absl::Status end_;
   bool ended_ = false;

@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "core/mesh/types.h"
 #include "core/quality/pose_quality.h"
 #include "core/weights/bind_quality.h"
@@ -66,7 +68,10 @@ struct BindingInfo {
   BindQuality quality;
   int64_t unbound_count = 0;
   std::vector<UnboundInfo> unbound;
+  int64_t clamped_count = 0;
+  std::vector<int64_t> clamped;  // Points held at rest on request, sorted.
   std::vector<ExitPartInfo> exit_parts;
+  int64_t fixed_handle_count = 0;  // Handles that no pose moves.
   std::vector<std::string> warnings;
   WallTime create_time;
   // From CreateBinding only: it was there before.
@@ -80,6 +85,25 @@ struct QualityInfo {
   // If a pose was named. Its points only if they were asked for.
   std::optional<PoseQuality> pose;
   int64_t points_measured = 0;
+};
+
+// A session that has moved to a binding of edited handles.
+struct MovedSession {
+  std::string session_id;
+  uint64_t revision = 0;    // Its first with the new binding.
+  double largest_jump = 0;  // Of any point of the model, in units of D.
+};
+
+struct EditedBinding {
+  BindingInfo binding;
+  // Of each row of a pose: which row of the old binding's it was, or -1.
+  std::vector<int32_t> previous;
+  // Newton steps a point of the new binding, and of the old one.
+  double iterations_mean = 0;
+  double iterations_mean_before = 0;
+  std::vector<MovedSession> moved;
+  // Sessions that did not move, with the reason.
+  std::vector<std::pair<std::string, absl::Status>> not_moved;
 };
 
 struct SessionInfo {

@@ -19,6 +19,7 @@ namespace {
 const Light kGroundTop(0.985f, 0.985f, 0.98f);
 const Light kGroundBottom(0.90f, 0.915f, 0.93f);
 const Light kRig(0.10f, 0.27f, 0.46f);
+const Light kMark(0.62f, 0.11f, 0.13f);
 const Light kText(0.22f, 0.25f, 0.29f);
 
 constexpr double kMargin = 0.06;
@@ -57,6 +58,12 @@ absl::Status CheckPicture(const Picture& picture) {
           CheckIndices(picture.rig_faces, panel.rig.rows(), "picture"));
     }
   }
+  for (const int64_t point : picture.marked) {
+    if (point < 0 || point >= first.positions.rows()) {
+      return BadPicture("point ", point, " of ", first.positions.rows(),
+                        " cannot be marked");
+    }
+  }
   return CheckIndices(picture.faces, first.positions.rows(), "picture");
 }
 
@@ -74,6 +81,16 @@ std::set<std::pair<int32_t, int32_t>> EdgesOf(const Faces& faces) {
     }
   }
   return edges;
+}
+
+void DrawMarks(const std::vector<int64_t>& marked, const Positions& positions,
+               const Camera& camera, double pixel, Canvas& canvas) {
+  constexpr double kSlack = 1e-3;
+  for (const int64_t point : marked) {
+    const Projected at = camera.Project(positions.row(point));
+    canvas.Line(at, at, 4.5 * pixel, 0.9f, 0.08f, kSlack);
+  }
+  canvas.FlushLines(kMark);
 }
 
 void DrawRig(const Positions& rig, const Faces& faces, const Camera& camera,
@@ -129,6 +146,7 @@ Image DrawPanel(const Picture& picture, const PicturePanel& panel,
   } else {
     DrawShaded(panel.positions, picture.faces, paint, camera, canvas);
   }
+  DrawMarks(picture.marked, panel.positions, camera, pixel, canvas);
   if (panel.rig.rows() > 0) {
     DrawRig(panel.rig, panel.rig_is_handles ? Faces() : picture.rig_faces,
             camera, pixel, canvas);

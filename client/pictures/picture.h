@@ -32,6 +32,8 @@ struct Picture {
   // handles.
   Faces rig_faces;
   std::vector<PicturePanel> panels;
+  // Points drawn as dots, such as clamped ones.
+  std::vector<int64_t> marked = {};
   ColorScale scale;  // Of the panels' values.
   View view;         // Of no meaning in 2D.
   // Of each panel, pixels, 64 to 4096.

@@ -9,8 +9,38 @@ namespace deform {
 
 Pose RestPose(const Rig& rig) { return {.vertices = RestVertices(rig)}; }
 
-absl::Status CheckPoseUpdate(const PoseUpdate& update, const Rig& rig) {
-  const int64_t vertices = RestVertices(rig).rows();
+namespace {
+
+absl::Status CheckIndices(const std::vector<int32_t>& indices,
+                          const PoseShape& shape) {
+  const int64_t moving = shape.rows;
+  for (size_t i = 0; i < indices.size(); ++i) {
+    const int32_t vertex = indices[i];
+    if (vertex >= 0 && vertex < moving) continue;
+    if (vertex >= 0 && vertex < moving + shape.fixed) {
+      return InvalidInput(
+          "FIXED_HANDLE", "pose.vertices",
+          absl::StrCat("pose entry ", i, " moves handle ", vertex,
+                       ", which is fixed, as all from ", moving, " on"));
+    }
+    return InvalidInput("INDEX_OUT_OF_RANGE", "pose.vertices",
+                        absl::StrCat("pose entry ", i, " refers to vertex ",
+                                     vertex, " of ", moving));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+PoseShape ShapeOf(const Rig& rig) {
+  const int64_t rows = PoseRows(rig);
+  return {.dimension = DimensionOf(rig),
+          .rows = rows,
+          .fixed = RestVertices(rig).rows() - rows};
+}
+
+absl::Status CheckPoseUpdate(const PoseUpdate& update, const PoseShape& shape) {
+  const int64_t vertices = shape.rows;
   const int64_t named = static_cast<int64_t>(update.vertices.size());
   const int64_t expected = named == 0 ? vertices : named;
   // A change of the blend alone moves no vertex.
@@ -23,17 +53,11 @@ absl::Status CheckPoseUpdate(const PoseUpdate& update, const Rig& rig) {
                      named == 0 ? "the rig has " : "names ", expected,
                      " vertices"));
   }
-  for (int64_t i = 0; i < named; ++i) {
-    if (update.vertices[i] < 0 || update.vertices[i] >= vertices) {
-      return InvalidInput("INDEX_OUT_OF_RANGE", "pose.vertices",
-                          absl::StrCat("pose entry ", i, " refers to vertex ",
-                                       update.vertices[i], " of ", vertices));
-    }
-  }
+  DEFORM_RETURN_IF_ERROR(CheckIndices(update.vertices, shape));
   DEFORM_RETURN_IF_ERROR(
       CheckPositions(update.positions, "pose entry", "pose.positions"));
   // Of no rows there is no column either.
-  if (DimensionOf(rig) == 2 && update.positions.rows() > 0 &&
+  if (shape.dimension == 2 && update.positions.rows() > 0 &&
       !(update.positions.col(2).array() == 0).all()) {
     return InvalidInput("NOT_PLANAR", "pose.positions",
                         "a 2D pose must lie in the plane z = 0");
@@ -50,7 +74,7 @@ absl::Status CheckPoseUpdate(const PoseUpdate& update, const Rig& rig) {
 void ApplyPoseUpdate(const PoseUpdate& update, Pose& pose) {
   if (update.stretch_blend) pose.stretch_blend = *update.stretch_blend;
   if (update.vertices.empty()) {
-    if (update.positions.rows() > 0) pose.vertices = update.positions;
+    pose.vertices.topRows(update.positions.rows()) = update.positions;
     return;
   }
   for (size_t i = 0; i < update.vertices.size(); ++i) {

@@ -59,6 +59,7 @@ class Binder {
   void AssignExits();
   absl::Status ExtendOutside();
   void Finish();
+  std::shared_ptr<const Solutions> solutions() const { return solutions_; }
 
  private:
   const Positions& points() const { return request_.model->positions(); }
@@ -84,6 +85,10 @@ class Binder {
       ABSL_LOCKS_EXCLUDED(mutex_);
   void ListUnbound();
   void Warn();
+  bool IsClamped(int64_t i) const { return !clamped_.empty() && clamped_[i]; }
+  void DropClamped(std::vector<int64_t>& points) const {
+    std::erase_if(points, [&](int64_t i) { return IsClamped(i); });
+  }
 
   const BindRequest& request_;
   const BindControl& control_;
@@ -98,6 +103,9 @@ class Binder {
   std::vector<PointState> states_;   // N
   std::vector<int32_t> exit_faces_;  // N, -1 for none.
   std::vector<UnboundPoints> unassigned_;
+  std::vector<char> clamped_;             // N, or empty if there are none.
+  const Solutions* known_ = nullptr;      // Of as many points.
+  std::shared_ptr<Solutions> solutions_;  // For iterative schemes.
 
   Mutex mutex_;
   Figures figures_ ABSL_GUARDED_BY(mutex_);
@@ -116,7 +124,16 @@ Binder::Binder(const BindRequest& request, const BindControl& control,
       diagonal_(DiagonalOf(request.rig)),
       rest_(parts.columns, 3),
       states_(request.model->size()),
-      exit_faces_(request.model->size(), -1) {
+      exit_faces_(request.model->size(), -1),
+      clamped_(request.clamped.empty() ? 0 : request.model->size()) {
+  for (const int64_t i : request.clamped) clamped_[i] = 1;
+  if (parts.scheme->rig_kind() == RigKind::kHandles) {
+    const int64_t points = request.model->size();
+    solutions_ = std::make_shared<Solutions>(Solutions::Zero(points, 3));
+    if (control.known != nullptr && control.known->rows() == points) {
+      known_ = control.known;
+    }
+  }
   const Positions& vertices = RestVertices(request.rig);
   rest_.topRows(vertices.rows()) = vertices.rowwise() - center_.transpose();
   if (rest_.rows() == vertices.rows()) return;
@@ -139,6 +156,7 @@ Binder::Rows Binder::RowsOf(Block at) {
 TileBlock Binder::Evaluate(Block at, Rows& rows) const {
   TileBlock block{.tiles =
                       rows.tiles().tile((at.first - rows.first) / kTilePoints)};
+  if (known_ != nullptr) block.known = known_->middleRows(at.first, at.count);
   evaluator_.EvaluateTiles(points().middleRows(at.first, at.count), block);
   return block;
 }
@@ -182,8 +200,16 @@ void Binder::EvaluateBlock(Block at) {
   const TileBlock block = Evaluate(at, rows);
   std::copy(block.states.begin(), block.states.end(),
             states_.begin() + at.first);
+  if (block.solutions.rows() > 0) {
+    solutions_->middleRows(at.first, at.count) = block.solutions;
+  }
+  for (int64_t i = at.first; i < at.first + at.count; ++i) {
+    if (IsClamped(i)) rows.tiles().Clear(i - rows.first);
+  }
   Figures figures;
-  const auto bound = [&](int64_t i) { return IsBound(states_[i]); };
+  const auto bound = [&](int64_t i) {
+    return IsBound(states_[i]) && !IsClamped(i);
+  };
   Measure(at, rows, bound, figures);
   for (int64_t i = 0; i < std::ssize(block.iterations); ++i) {
     if (!bound(at.first + i)) continue;
@@ -229,11 +255,16 @@ void Binder::AssignExits() {
   if (cage == nullptr) return;
   ExitAssignment exits =
       AssignExitFaces(*request_.model, *cage, states_, request_.exits);
-  for (const ExitPart& part : exits.parts) {
+  // Clamped points hold their part together, but need no exit themselves.
+  for (ExitPart& part : exits.parts) {
+    DropClamped(part.points);
     for (int64_t i : part.points) exit_faces_[i] = part.exit_face;
+    if (!part.points.empty()) parts_.exit_parts.push_back(std::move(part));
   }
-  parts_.exit_parts = std::move(exits.parts);
-  unassigned_ = std::move(exits.unbound);
+  for (UnboundPoints& group : exits.unbound) {
+    DropClamped(group.points);
+    if (!group.points.empty()) unassigned_.push_back(std::move(group));
+  }
 }
 
 void Binder::ExtendBlock(Block at) {
@@ -287,6 +318,7 @@ absl::Status Binder::ExtendOutside() {
 void Binder::ListUnbound() {
   parts_.unbound = unassigned_;
   const auto add = [&](absl::string_view reason, std::vector<int64_t> points) {
+    DropClamped(points);
     if (points.empty()) return;
     parts_.unbound.push_back({std::string(reason),
                               UnboundAdvice(std::string(reason)),
@@ -327,6 +359,13 @@ void Binder::Warn() {
   std::vector<std::string>& warnings = parts_.warnings;
   if (const Handles* handles = std::get_if<Handles>(&request_.rig)) {
     warnings = CoincidenceWarnings(handles->positions());
+    if (handles->fixed_count() > 0) {
+      warnings.insert(warnings.begin(),
+                      absl::StrCat(handles->fixed_count(), " handles, from ",
+                                   handles->free_count(),
+                                   " on, are fixed: no pose moves "
+                                   "them"));
+    }
   }
   for (const ExitPart& part : parts_.exit_parts) {
     if (part.crossed_faces.empty()) continue;
@@ -337,8 +376,10 @@ void Binder::Warn() {
                      " more, such as face ", part.crossed_faces.front(),
                      ": the map is smooth there only while these move alike"));
   }
-  const int64_t outside =
-      std::count(states_.begin(), states_.end(), PointState::kBoundOutside);
+  int64_t outside = 0;
+  for (size_t i = 0; i < states_.size(); ++i) {
+    outside += states_[i] == PointState::kBoundOutside && !IsClamped(i);
+  }
   if (outside > 0) {
     warnings.push_back(absl::StrCat(outside,
                                     " points lie outside the cage; this scheme "
@@ -370,14 +411,24 @@ absl::Status CheckTolerance(double tolerance) {
                    tolerance));
 }
 
+absl::Status CheckClamped(const BindRequest& request) {
+  const std::vector<int64_t>& clamped = request.clamped;
+  const int64_t points = request.model->size();
+  if (clamped.empty() || (clamped.front() >= 0 && clamped.back() < points)) {
+    return absl::OkStatus();
+  }
+  return InvalidInput(
+      "INDEX_OUT_OF_RANGE", "clamped_points",
+      absl::StrCat("clamped_points names point ",
+                   clamped.front() < 0 ? clamped.front() : clamped.back(),
+                   "; the model has ", points, " points"));
+}
+
 absl::Status CheckFits(const BindRequest& request) {
   DEFORM_RETURN_IF_ERROR(CheckTolerance(request.weight_tolerance));
-  if (request.model->dimension() != DimensionOf(request.rig)) {
-    return InvalidInput(
-        "DIMENSION_MISMATCH", "rig",
-        absl::StrCat("the model is ", request.model->dimension(),
-                     "D and its rig ", DimensionOf(request.rig), "D"));
-  }
+  DEFORM_RETURN_IF_ERROR(CheckClamped(request));
+  DEFORM_RETURN_IF_ERROR(
+      CheckSameDimension(*request.model, DimensionOf(request.rig)));
   if (const Cage* cage = std::get_if<Cage>(&request.rig)) {
     return CheckExitRegions(request.exits, *cage, request.model->size());
   }
@@ -418,9 +469,11 @@ absl::StatusOr<std::shared_ptr<const Binding>> Bind(
   parts.compute_seconds = SecondsSince(start);
   BindingFacts facts(std::move(parts));
   if (!dense) {
-    return CompressBinding(facts, nullptr, request.weight_tolerance, control);
+    return CompressBinding(facts, nullptr, request.weight_tolerance, control,
+                           binder.solutions());
   }
-  return std::make_shared<const Binding>(std::move(facts), std::move(weights));
+  return std::make_shared<const Binding>(std::move(facts), std::move(weights),
+                                         binder.solutions());
 }
 
 }  // namespace deform

@@ -109,6 +109,8 @@ BindingFacts::BindingFacts(Parts parts) {
   for (const UnboundPoints& group : state->unbound) {
     fixed.insert(fixed.end(), group.points.begin(), group.points.end());
   }
+  const auto& clamped = state->request.clamped;
+  fixed.insert(fixed.end(), clamped.begin(), clamped.end());
   std::sort(fixed.begin(), fixed.end());
   state_ = std::move(state);
 }
@@ -128,7 +130,7 @@ int64_t BindingFacts::bytes() const {
     indices += static_cast<int64_t>(part.crossed_faces.size());
   }
   // In their group, and among the fixed points.
-  numbers += 2 * unbound_count();
+  numbers += 2 * static_cast<int64_t>(fixed_points().size());
   return numbers * int64_t{sizeof(double)} + indices * int64_t{sizeof(int32_t)};
 }
 
@@ -143,9 +145,10 @@ void Binding::CopyWeights(int64_t first, int64_t count, float* out) const {
 }
 
 std::shared_ptr<const Binding> Binding::WithFacts(BindingFacts facts) const {
-  return compressed_
-             ? std::make_shared<const Binding>(std::move(facts), compressed_)
-             : std::make_shared<const Binding>(std::move(facts), weights_);
+  return compressed_ ? std::make_shared<const Binding>(std::move(facts),
+                                                       compressed_, solutions_)
+                     : std::make_shared<const Binding>(std::move(facts),
+                                                       weights_, solutions_);
 }
 
 absl::StatusOr<WeightBlock> RecomputeWeights(const BindingFacts& binding,

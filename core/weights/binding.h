@@ -35,6 +35,9 @@ struct BindRequest {
   // cluster by cluster, so that the dense ones never exist at once; they are
   // computed twice.
   double weight_tolerance = 0;
+  // Points that stay at rest whatever the pose; sorted, each once. They need no
+  // weights, so it does not matter where they are.
+  std::vector<int64_t> clamped;
 };
 
 // How a computation reports and is stopped. All may be null.
@@ -43,6 +46,9 @@ struct BindControl {
   const Cancellation* cancellation = nullptr;
   // Points done so far; only rises. Read it from any thread.
   std::atomic<int64_t>* points_done = nullptr;
+  // Solutions of another binding of the model by the same scheme: where the
+  // searches start.
+  const Solutions* known = nullptr;
 };
 
 // What is known of a binding beside its weights: small, and enough to compute
@@ -70,20 +76,23 @@ class BindingFacts {
   const SchemeOptions& options() const { return request().options; }
   const std::vector<ExitPart>& exit_parts() const { return state_->exit_parts; }
   const std::vector<UnboundPoints>& unbound() const { return state_->unbound; }
+  const std::vector<int64_t>& clamped() const { return request().clamped; }
   const std::vector<std::string>& warnings() const { return state_->warnings; }
   const BindQuality& quality() const { return state_->quality; }
   double compute_seconds() const { return state_->compute_seconds; }
 
   int dimension() const { return model()->dimension(); }
   int64_t point_count() const { return model()->size(); }
-  // Rows of a pose.
+  // Columns of the weights that belong to vertices or handles: those of a pose
+  // (PoseRows), then the fixed handles.
   int64_t vertex_count() const { return RestVertices(rig()).rows(); }
   int64_t column_count() const { return state_->columns; }
   int64_t normal_count() const { return column_count() - vertex_count(); }
   int64_t unbound_count() const {
-    return static_cast<int64_t>(fixed_points().size());
+    return static_cast<int64_t>(fixed_points().size() - clamped().size());
   }
-  // Points that stay at rest whatever the pose, sorted: those without weights.
+  // Points that stay at rest whatever the pose, sorted: the unbound and the
+  // clamped.
   const std::vector<int64_t>& fixed_points() const {
     return state_->fixed_points;
   }
@@ -101,35 +110,51 @@ class BindingFacts {
 // Facts and weights. Immutable; travels as shared_ptr<const Binding>.
 class Binding : public BindingFacts {
  public:
-  // N x C; rows of unbound points are 0.
-  Binding(BindingFacts facts, std::shared_ptr<const WeightTiles> weights)
-      : BindingFacts(std::move(facts)), weights_(std::move(weights)) {}
-  Binding(BindingFacts facts, std::shared_ptr<const CompressedWeights> weights)
-      : BindingFacts(std::move(facts)), compressed_(std::move(weights)) {}
+  // N x C; rows of fixed points are 0. `solutions` are those of iterative
+  // schemes.
+  Binding(BindingFacts facts, std::shared_ptr<const WeightTiles> weights,
+          std::shared_ptr<const Solutions> solutions = nullptr)
+      : BindingFacts(std::move(facts)),
+        weights_(std::move(weights)),
+        solutions_(std::move(solutions)) {}
+  Binding(BindingFacts facts, std::shared_ptr<const CompressedWeights> weights,
+          std::shared_ptr<const Solutions> solutions = nullptr)
+      : BindingFacts(std::move(facts)),
+        compressed_(std::move(weights)),
+        solutions_(std::move(solutions)) {}
 
   // Only if they are dense.
   const WeightTiles& weights() const { return *weights_; }
   // Null if they are dense.
   const CompressedWeights* compressed() const { return compressed_.get(); }
 
+  // What is held beside the facts.
   int64_t weight_bytes() const {
-    return compressed_ ? compressed_->bytes() : weights_->bytes();
+    return (compressed_ ? compressed_->bytes() : weights_->bytes()) +
+           (solutions_ ? solutions_->size() * int64_t{4} : 0);
   }
   // Weights of points [first, first + count) by rows, count x C, in either
   // form.
   void CopyWeights(int64_t first, int64_t count, float* out) const;
   // The same weights for other facts, such as those of an equal binding.
   std::shared_ptr<const Binding> WithFacts(BindingFacts facts) const;
+  // N x 3, of iterative schemes; else null.
+  const std::shared_ptr<const Solutions>& solutions() const {
+    return solutions_;
+  }
 
  private:
   // One of these.
   std::shared_ptr<const WeightTiles> weights_;
   std::shared_ptr<const CompressedWeights> compressed_;
+
+  std::shared_ptr<const Solutions> solutions_;
 };
 
 // Computes the weights, tile by tile, on all threads of the pool. Errors:
 //   NotFound UNKNOWN_SCHEME; InvalidArgument WRONG_RIG, INVALID_OPTION,
-//   DIMENSION_MISMATCH, WEIGHT_TOLERANCE_OUT_OF_RANGE, those of
+//   DIMENSION_MISMATCH, WEIGHT_TOLERANCE_OUT_OF_RANGE,
+//   INDEX_OUT_OF_RANGE (clamped), those of
 //   CheckExitRegions, CAGE_OVERLAPPING
 //   FailedPrecondition EXTERIOR_NO_EXIT_FACE, EXIT_AMBIGUOUS, OUTSIDE_HULL,
 //     NOT_CONVERGED, WEIGHT_TOO_LARGE (for float) with Unbindable::kFail: says
@@ -139,7 +164,7 @@ absl::StatusOr<std::shared_ptr<const Binding>> Bind(const BindRequest& request,
                                                     const BindControl& control);
 
 // The weights of points [first, first + count) again, in double: what Bind()
-// cached, without the error of float. Rows of unbound points are 0.
+// cached, without the error of float. Rows of fixed points are 0.
 // InvalidArgument RANGE_OUT_OF_BOUNDS if there are no such points.
 absl::StatusOr<WeightBlock> RecomputeWeights(const BindingFacts& binding,
                                              int64_t first, int64_t count);

@@ -77,7 +77,7 @@ std::vector<double> PoseBounds(const BindingFacts& facts) {
 
 absl::StatusOr<std::shared_ptr<const Binding>> CompressBinding(
     const BindingFacts& facts, const WeightTiles* dense, double tolerance,
-    const BindControl& control) {
+    const BindControl& control, std::shared_ptr<const Solutions> solutions) {
   DEFORM_ASSIGN_OR_RETURN(auto evaluator,
                           facts.scheme().Prepare(facts.rig(), facts.options()));
   const RowComputation computation(facts, std::move(evaluator));
@@ -98,7 +98,8 @@ absl::StatusOr<std::shared_ptr<const Binding>> CompressBinding(
           source, tolerance,
           {.pool = control.pool, .cancellation = control.cancellation}));
   return std::make_shared<const Binding>(
-      facts, std::make_shared<const CompressedWeights>(std::move(weights)));
+      facts, std::make_shared<const CompressedWeights>(std::move(weights)),
+      std::move(solutions));
 }
 
 bool WorthCompressing(int64_t dense_bytes) {

@@ -23,10 +23,11 @@ std::vector<double> PoseBounds(const BindingFacts& facts);
 // a fraction of D for poses that move vertices by up to D and scaled normals by
 // up to 2, after the best similarity is taken out. See CompressWeights(). From
 // the dense weights of `facts`, or, if null, computed again cluster by cluster.
-// Cancelled.
+// `solutions` go along as they are. Cancelled.
 absl::StatusOr<std::shared_ptr<const Binding>> CompressBinding(
     const BindingFacts& facts, const WeightTiles* dense, double tolerance,
-    const BindControl& control);
+    const BindControl& control,
+    std::shared_ptr<const Solutions> solutions = nullptr);
 
 // Dense weights that lie in the processor's caches anyway gain nothing.
 bool WorthCompressing(int64_t dense_bytes);

@@ -24,7 +24,7 @@ void RoundRows(const RowMatrix& rows, int64_t at, int64_t first, float* tile) {
 
 void WeightEvaluator::EvaluateTiles(const PositionsRef& points,
                                     TileBlock& block) const {
-  WeightBlock doubles;
+  WeightBlock doubles{.known = std::move(block.known)};
   Evaluate(points, doubles);
   const int64_t columns = doubles.vertex.cols() + doubles.normal.cols();
   for (int64_t at = 0; at < points.rows(); at += kTilePoints) {
@@ -35,6 +35,7 @@ void WeightEvaluator::EvaluateTiles(const PositionsRef& points,
   block.states = std::move(doubles.states);
   block.iterations = std::move(doubles.iterations);
   block.residuals = std::move(doubles.residuals);
+  block.solutions = std::move(doubles.solutions);
 }
 
 }  // namespace deform

@@ -44,8 +44,15 @@ enum class PointState : uint8_t {
 using RowMatrix =
     Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+// Where the searches of an iterative scheme ended, a row for each point; 0
+// where there is no solution. Those of nearly the same rig may start there.
+using Solutions = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
+
 // Weights of a block of points, in double.
 struct WeightBlock {
+  // The caller's: solutions for a similar rig, n x 3, or none. The weights
+  // depend on them by rounding only.
+  Solutions known;
   RowMatrix vertex;  // n x V, no unit; every bound row sums to 1.
   RowMatrix normal;  // n x F, model units; n x 0 if normals are not used.
   std::vector<PointState> states;  // n
@@ -54,6 +61,7 @@ struct WeightBlock {
   // celestial coordinates. 0 for points that needed no search.
   std::vector<uint16_t> iterations;
   std::vector<double> residuals;
+  Solutions solutions;
 };
 
 // Weights of a block of points as they are cached: float, in tiles.
@@ -63,9 +71,11 @@ struct TileBlock {
   // cannot hold with infinity.
   float* tiles = nullptr;
   // As in WeightBlock.
+  Solutions known;
   std::vector<PointState> states;
   std::vector<uint16_t> iterations;
   std::vector<double> residuals;
+  Solutions solutions;
 };
 
 // To be added to a weight. Columns count the vertices, then the normals.
@@ -111,7 +121,8 @@ class WeightEvaluator {
 };
 
 struct SchemeOptions {
-  // T-CC: s_i >= 0, one per handle; empty means all 0.
+  // T-CC: s_i >= 0, one per free handle; empty means all 0. Those of fixed
+  // handles are 0.
   std::vector<double> handle_weights;
   // S-CC: > 1; 0 means 2. Accepted for those who have a value: it cancels out.
   double lambda = 0;

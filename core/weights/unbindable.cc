@@ -27,8 +27,8 @@ constexpr Reason kReasons[] = {
      "lie outside the cage and have no single exit face", ""},
     {"OUTSIDE_HULL", "lies outside the convex hull of the handles",
      "lie outside the convex hull of the handles",
-     "add handles around them, such as the corners of the model's box, 1.6 "
-     "times as large"},
+     "add handles around them, or the corners of the model's box as fixed "
+     "handles (add_box_handles, --add-box)"},
     {"NOT_CONVERGED",
      "is so close to the hull that the solver found no weights",
      "are so close to the hull that the solver found no weights",

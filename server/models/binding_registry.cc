@@ -19,7 +19,7 @@ constexpr std::chrono::milliseconds kPollInterval{20};
 std::string BindingId(const BindSpec& spec) {
   ContentHash hash("binding");
   hash.Add(spec.tenant).Add(spec.model_id).Add(spec.scheme);
-  hash.Add(RestVertices(spec.rig));
+  hash.Add(RestVertices(spec.rig)).Add(PoseRows(spec.rig));
   if (const Cage* cage = std::get_if<Cage>(&spec.rig)) hash.Add(cage->faces());
   hash.Add(int64_t{DimensionOf(spec.rig)});
   hash.Add(std::span<const double>(spec.options.handle_weights));
@@ -28,16 +28,20 @@ std::string BindingId(const BindSpec& spec) {
   hash.Add(std::span<const int32_t>(spec.exits.faces));
   hash.Add(std::span<const int32_t>(spec.exits.face_of_point));
   hash.Add(static_cast<int64_t>(spec.unbindable));
+  hash.Add(std::span<const int64_t>(spec.clamped));
   return "b-" + hash.Finish();
 }
 
-// What the weights of a binding will take.
+// What the weights of a binding will take, with the solutions that schemes of
+// handles keep.
 int64_t WeightBytes(const Rig& rig, const CoordinateScheme& scheme,
                     int64_t points) {
   int64_t columns = RestVertices(rig).rows();
   const Cage* cage = std::get_if<Cage>(&rig);
   if (cage != nullptr && scheme.uses_normals()) columns += cage->face_count();
-  return WeightTiles::BytesFor(points, columns);
+  const int64_t solutions =
+      cage == nullptr ? 3 * points * int64_t{sizeof(float)} : 0;
+  return WeightTiles::BytesFor(points, columns) + solutions;
 }
 
 // What will be known beside them, at worst: the request, and all points twice
@@ -48,7 +52,8 @@ int64_t FactBytes(const BindRequest& request) {
       (cage != nullptr ? cage->faces().size() : 0) +
       static_cast<int64_t>(request.exits.faces.size()) +
       static_cast<int64_t>(request.exits.face_of_point.size());
-  return (RestVertices(request.rig).size() + 2 * request.model->size()) *
+  return (RestVertices(request.rig).size() + 2 * request.model->size() +
+          std::ssize(request.clamped)) *
              int64_t{sizeof(double)} +
          indices * int64_t{sizeof(int32_t)};
 }
@@ -74,7 +79,8 @@ struct BindingRegistry::Job {
   Cancellation cancellation;
   // Until Compute() takes them.
   MemoryBudget::Reservation memory;
-  ModelCatalogue::Lease model;  // Of a new binding.
+  ModelCatalogue::Lease model;                       // Of a new binding.
+  std::shared_ptr<const Solutions> known_solutions;  // Or null.
   // Guarded by the registry's mutex.
   int waiters = 0;
   std::optional<absl::StatusOr<CreatedBinding>> outcome;
@@ -145,15 +151,17 @@ absl::StatusOr<std::shared_ptr<BindingRegistry::Job>> BindingRegistry::MakeJob(
       auto model,
       models_.catalogue().Use(key.first, spec.model_id,
                               absl::StrCat("binding ", key.second)));
-  auto job =
-      std::make_shared<Job>(key, BindRequest{.model = model.record()->mesh,
-                                             .rig = std::move(spec.rig),
-                                             .scheme = std::move(spec.scheme),
-                                             .options = std::move(spec.options),
-                                             .exits = std::move(spec.exits),
-                                             .unbindable = spec.unbindable});
+  auto job = std::make_shared<Job>(
+      key, BindRequest{.model = model.record()->mesh,
+                       .rig = std::move(spec.rig),
+                       .scheme = std::move(spec.scheme),
+                       .options = std::move(spec.options),
+                       .exits = std::move(spec.exits),
+                       .unbindable = spec.unbindable,
+                       .clamped = std::move(spec.clamped)});
   job->points_total = job->request->model->size();
   job->model = std::move(model);
+  job->known_solutions = std::move(spec.known);
   DEFORM_ASSIGN_OR_RETURN(
       job->memory, budget().Reserve(WeightBytes(job->request->rig, *scheme,
                                                 job->points_total) +
@@ -262,7 +270,8 @@ absl::StatusOr<CreatedBinding> BindingRegistry::Compute(Job& job) try {
       const auto computed,
       bind_(*job.request, {.pool = &pool_,
                            .cancellation = &job.cancellation,
-                           .points_done = &job.points_done}));
+                           .points_done = &job.points_done,
+                           .known = job.known_solutions.get()}));
   auto weights = memory.Split(computed->weight_bytes());
   if (job.known != nullptr) {
     // The facts stay the record's: one copy, and figures that do not change.

@@ -37,6 +37,10 @@ struct BindSpec {
   SchemeOptions options;
   ExitRegions exits;
   Unbindable unbindable = Unbindable::kFail;
+  std::vector<int64_t> clamped;  // Sorted, each once.
+  // Where the search for the weights starts (BindControl); no part of what is
+  // asked for.
+  std::shared_ptr<const Solutions> known;
 };
 
 struct BindingRecord {
@@ -141,6 +145,7 @@ class BindingRegistry {
   // Set while the weights of this binding are being computed again.
   std::optional<BindProgress> ProgressOf(const BindingRecord& record);
 
+  ModelRegistry& models() { return models_; }
   MemoryBudget& budget() { return weights_.budget(); }
   // To look things up; Use() and Remove() are here.
   const BindingCatalogue& catalogue() const { return bindings_; }

@@ -52,6 +52,11 @@ ContentHash& ContentHash::Add(std::span<const int32_t> numbers) {
   return *this;
 }
 
+ContentHash& ContentHash::Add(std::span<const int64_t> numbers) {
+  AddBytes(numbers.data(), numbers.size_bytes());
+  return *this;
+}
+
 ContentHash& ContentHash::Add(std::span<const double> numbers) {
   AddBytes(numbers.data(), numbers.size_bytes());
   return *this;

@@ -29,6 +29,7 @@ class ContentHash {
   ContentHash& Add(const Positions& positions);
   ContentHash& Add(const Faces& faces);
   ContentHash& Add(std::span<const int32_t> numbers);
+  ContentHash& Add(std::span<const int64_t> numbers);
   ContentHash& Add(std::span<const double> numbers);
 
   // The first 160 bits as 40 hexadecimal digits: no two contents share them by

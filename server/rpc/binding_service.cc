@@ -7,6 +7,7 @@
 
 #include "core/base/status_macros.h"
 #include "core/weights/scheme.h"
+#include "server/rpc/await_binding.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/quality.h"
 #include "server/rpc/weight_rows.h"
@@ -14,42 +15,12 @@
 namespace deform::server {
 namespace {
 
-// Between two looks at whether the caller is still there; a progress message is
-// sent as often if there is progress.
-constexpr std::chrono::milliseconds kProgressInterval{200};
-
-// A computation is stopped within a tile of the caller's leaving, which is
-// looked for as often as this.
-constexpr std::chrono::milliseconds kPollInterval{20};
-
 using BindingWriter = grpc::ServerWriter<v1::CreateBindingResponse>;
 
 bool WriteProgress(const BindProgress& progress, BindingWriter& writer) {
   v1::CreateBindingResponse message;
   ToProto(progress, message.mutable_progress());
   return writer.Write(message);
-}
-
-// Waits for the binding, telling progress.
-absl::StatusOr<CreatedBinding> Await(BindingRegistry::Waiter& waiter,
-                                     grpc::ServerContext& context,
-                                     CallRunner::Watch& watch,
-                                     BindingWriter& writer) {
-  int64_t told = -1;
-  auto told_at = std::chrono::steady_clock::now() - kProgressInterval;
-  for (;;) {
-    if (auto outcome = waiter.Wait(kPollInterval)) return *std::move(outcome);
-    if (context.IsCancelled()) return absl::CancelledError();
-    watch.Progressed();
-    const auto now = std::chrono::steady_clock::now();
-    const BindProgress progress = waiter.progress();
-    if (progress.points_done == told || now - told_at < kProgressInterval) {
-      continue;
-    }
-    if (!WriteProgress(progress, writer)) return absl::CancelledError();
-    told = progress.points_done;
-    told_at = now;
-  }
 }
 
 // The rows of `range`, computed at the priority of `pool`.
@@ -107,16 +78,31 @@ void BindingService::Describe(const BindingRecord& record, Detail detail,
   ToProto(*progress, out->mutable_progress());
 }
 
+absl::StatusOr<std::shared_ptr<const Mesh>> BindingService::BoxedModel(
+    const v1::CreateBindingRequest& request) const {
+  if (!request.add_box_handles()) return nullptr;
+  DEFORM_ASSIGN_OR_RETURN(const std::string tenant, TenantOr(request.tenant()));
+  DEFORM_ASSIGN_OR_RETURN(
+      const auto record,
+      bindings_.models().catalogue().Find(tenant, request.model_id()));
+  return record->mesh;
+}
+
 grpc::Status BindingService::CreateBinding(
     grpc::ServerContext* context, const v1::CreateBindingRequest* request,
     BindingWriter* writer) {
   return calls_.Run("CreateBinding", *context, [&]() -> absl::Status {
     CallRunner::Watch watch(calls_, *context);
-    DEFORM_ASSIGN_OR_RETURN(BindSpec spec, FromProto(*request));
+    DEFORM_ASSIGN_OR_RETURN(const auto model, BoxedModel(*request));
+    DEFORM_ASSIGN_OR_RETURN(BindSpec spec, FromProto(*request, model.get()));
     DEFORM_ASSIGN_OR_RETURN(const auto waiter,
                             bindings_.Create(std::move(spec)));
     DEFORM_ASSIGN_OR_RETURN(const CreatedBinding created,
-                            Await(*waiter, *context, watch, *writer));
+                            AwaitBinding(*waiter, *context, watch,
+                                         [&](const BindProgress& progress) {
+                                           return WriteProgress(progress,
+                                                                *writer);
+                                         }));
     v1::CreateBindingResponse message;
     Describe(*created.record, Detail::kFull, message.mutable_binding());
     message.mutable_binding()->set_existed(created.existed);

@@ -23,6 +23,9 @@ class BindingService final : public v1::BindingService::Service {
   grpc::Status CreateBinding(
       grpc::ServerContext* context, const v1::CreateBindingRequest* request,
       grpc::ServerWriter<v1::CreateBindingResponse>* writer) override;
+  grpc::Status EditHandles(
+      grpc::ServerContext* context, const v1::EditHandlesRequest* request,
+      grpc::ServerWriter<v1::EditHandlesResponse>* writer) override;
   grpc::Status GetBinding(grpc::ServerContext* context,
                           const v1::GetBindingRequest* request,
                           v1::GetBindingResponse* response) override;
@@ -45,6 +48,9 @@ class BindingService final : public v1::BindingService::Service {
  private:
   // With where its weights are.
   void Describe(const BindingRecord& record, Detail detail, v1::Binding* out);
+  // The model whose box the request wants handles at; null if it wants none.
+  absl::StatusOr<std::shared_ptr<const Mesh>> BoxedModel(
+      const v1::CreateBindingRequest& request) const;
 
   CallRunner& calls_;
   BindingRegistry& bindings_;

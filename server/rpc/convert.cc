@@ -1,5 +1,6 @@
 #include "server/rpc/convert.h"
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -90,24 +91,41 @@ absl::StatusOr<Rig> ToRig(const v1::Cage& cage, bool flip) {
   return Rig(std::move(made));
 }
 
-absl::StatusOr<Rig> ToRig(const v1::Handles& handles) {
+// `model`: whose box is to be added, or null.
+absl::StatusOr<Rig> ToRig(const v1::Handles& handles, const Mesh* model) {
   DEFORM_RETURN_IF_ERROR(
       CheckDimension(handles.dimension(), "rig.handles.dimension"));
   const int dimension = static_cast<int>(handles.dimension());
   DEFORM_ASSIGN_OR_RETURN(
       Positions positions,
       ToPositions(handles.positions(), dimension, "rig.handles.positions"));
-  DEFORM_ASSIGN_OR_RETURN(Handles made,
-                          Handles::Create(dimension, std::move(positions)));
+  DEFORM_ASSIGN_OR_RETURN(Positions fixed,
+                          ToPositions(handles.fixed_positions(), dimension,
+                                      "rig.handles.fixed_positions"));
+  if (model != nullptr) {
+    DEFORM_RETURN_IF_ERROR(CheckSameDimension(*model, dimension));
+    const Positions box = BoxHandles(*model);
+    fixed.conservativeResize(fixed.rows() + box.rows(), 3);
+    fixed.bottomRows(box.rows()) = box;
+  }
+  DEFORM_ASSIGN_OR_RETURN(
+      Handles made, Handles::Create(dimension, std::move(positions), fixed));
   return Rig(std::move(made));
 }
 
-absl::StatusOr<Rig> ToRig(const v1::Rig& rig, bool flip) {
+absl::StatusOr<Rig> ToRig(const v1::CreateBindingRequest& request,
+                          const Mesh* model) {
+  const v1::Rig& rig = request.rig();
   switch (rig.kind_case()) {
     case v1::Rig::kCage:
-      return ToRig(rig.cage(), flip);
+      if (request.add_box_handles()) {
+        return InvalidInput("WRONG_RIG", "add_box_handles",
+                            "the corners of a box can be added to handles; a "
+                            "cage has none");
+      }
+      return ToRig(rig.cage(), request.flip_inside_out());
     case v1::Rig::kHandles:
-      return ToRig(rig.handles());
+      return ToRig(rig.handles(), request.add_box_handles() ? model : nullptr);
     case v1::Rig::KIND_NOT_SET:
       break;
   }
@@ -137,6 +155,25 @@ absl::StatusOr<ExitRegions> ToExitRegions(const v1::ExitRegions& exits) {
   return regions;
 }
 
+// Sorted, each once.
+absl::StatusOr<std::vector<int64_t>> ToClamped(
+    const google::protobuf::RepeatedField<uint64_t>& points) {
+  constexpr uint64_t kMostPoints = uint64_t{1} << 62;
+  std::vector<int64_t> clamped;
+  clamped.reserve(points.size());
+  for (int i = 0; i < points.size(); ++i) {
+    if (points[i] > kMostPoints) {
+      return InvalidInput("INDEX_OUT_OF_RANGE", "clamped_points",
+                          absl::StrCat("clamped_points entry ", i, " is ",
+                                       points[i], ", beyond every point"));
+    }
+    clamped.push_back(static_cast<int64_t>(points[i]));
+  }
+  std::sort(clamped.begin(), clamped.end());
+  clamped.erase(std::unique(clamped.begin(), clamped.end()), clamped.end());
+  return clamped;
+}
+
 absl::Status UnknownValue(absl::string_view field, int value) {
   return InvalidInput("UNKNOWN_VALUE", field,
                       absl::StrCat(field, " ", value, " is not known"));
@@ -149,7 +186,7 @@ void ToProto(absl::Time time, google::protobuf::Timestamp* out) {
 }
 
 template <typename Out>
-void AddRows(const Positions& positions, int dimension, Out* out) {
+void AddRows(const PositionsRef& positions, int dimension, Out* out) {
   out->Reserve(static_cast<int>(positions.rows()) * dimension);
   for (int64_t i = 0; i < positions.rows(); ++i) {
     for (int c = 0; c < dimension; ++c)
@@ -187,7 +224,8 @@ absl::StatusOr<ModelUpload::Header> FromProto(const v1::ModelHeader& header) {
                              .face_count = header.face_count()};
 }
 
-absl::StatusOr<BindSpec> FromProto(const v1::CreateBindingRequest& request) {
+absl::StatusOr<BindSpec> FromProto(const v1::CreateBindingRequest& request,
+                                   const Mesh* model) {
   DEFORM_ASSIGN_OR_RETURN(std::string tenant, TenantOr(request.tenant()));
   DEFORM_RETURN_IF_ERROR(CheckName(request.model_id(), "model_id"));
   if (request.scheme().empty()) {
@@ -198,9 +236,10 @@ absl::StatusOr<BindSpec> FromProto(const v1::CreateBindingRequest& request) {
   if (!v1::Unbindable_IsValid(request.unbindable())) {
     return UnknownValue("unbindable", request.unbindable());
   }
-  DEFORM_ASSIGN_OR_RETURN(Rig rig,
-                          ToRig(request.rig(), request.flip_inside_out()));
+  DEFORM_ASSIGN_OR_RETURN(Rig rig, ToRig(request, model));
   DEFORM_ASSIGN_OR_RETURN(ExitRegions exits, ToExitRegions(request.exits()));
+  DEFORM_ASSIGN_OR_RETURN(std::vector<int64_t> clamped,
+                          ToClamped(request.clamped_points()));
   const auto& weights = request.options().handle_weights();
   return BindSpec{
       .tenant = std::move(tenant),
@@ -212,7 +251,8 @@ absl::StatusOr<BindSpec> FromProto(const v1::CreateBindingRequest& request) {
       .exits = std::move(exits),
       .unbindable = request.unbindable() == v1::UNBINDABLE_REPORT
                         ? Unbindable::kReport
-                        : Unbindable::kFail};
+                        : Unbindable::kFail,
+      .clamped = std::move(clamped)};
 }
 
 absl::StatusOr<PoseUpdate> FromProto(const v1::Pose& pose, int dimension) {
@@ -274,7 +314,8 @@ void ToProto(const BindingRecord& record, Detail detail, v1::Binding* out) {
   out->set_scheme(std::string(binding.scheme().id()));
   out->set_dimension(binding.dimension());
   out->set_point_count(binding.point_count());
-  out->set_vertex_count(binding.vertex_count());
+  out->set_vertex_count(PoseRows(binding.rig()));
+  out->set_fixed_handle_count(binding.vertex_count() - PoseRows(binding.rig()));
   out->set_normal_count(binding.normal_count());
   out->set_rig_diagonal(DiagonalOf(binding.rig()));
   const WeightsCache::Slot::State weights = record.weights->state();
@@ -286,6 +327,7 @@ void ToProto(const BindingRecord& record, Detail detail, v1::Binding* out) {
   out->set_compute_seconds(binding.compute_seconds());
   ToProto(binding.quality(), out->mutable_quality());
   out->set_unbound_count(binding.unbound_count());
+  out->set_clamped_count(binding.clamped().size());
   ToProto(record.create_time, out->mutable_create_time());
   if (detail == Detail::kSummary) return;
   for (const UnboundPoints& unbound : binding.unbound()) {
@@ -304,6 +346,8 @@ void ToProto(const BindingRecord& record, Detail detail, v1::Binding* out) {
   for (const std::string& warning : binding.warnings()) {
     out->add_warnings(warning);
   }
+  out->mutable_clamped_points()->Add(binding.clamped().begin(),
+                                     binding.clamped().end());
 }
 
 void ToProto(const BindProgress& progress, v1::BindingProgress* out) {
@@ -335,9 +379,12 @@ void ToProto(const Rig& rig, v1::Rig* out) {
                                                 faces.data() + faces.size());
     return;
   }
+  const auto& handles = std::get<Handles>(rig);
   out->mutable_handles()->set_dimension(dimension);
-  AddRows(RestVertices(rig), dimension,
+  AddRows(handles.positions().topRows(handles.free_count()), dimension,
           out->mutable_handles()->mutable_positions());
+  AddRows(handles.positions().bottomRows(handles.fixed_count()), dimension,
+          out->mutable_handles()->mutable_fixed_positions());
 }
 
 void ToProto(const SessionState& state, v1::Session* session) {
@@ -357,16 +404,31 @@ void ToProto(const CoordinateScheme& scheme, v1::Scheme* out) {
   out->set_uses_normals(scheme.uses_normals());
 }
 
-void ToProto(const Session& session, const Session::Joined& joined,
-             const FrameEncoding& encoding, v1::Joined* out) {
-  const Binding& binding = session.binding();
+void ToProto(const Session::Joined& joined, const FrameEncoding& encoding,
+             v1::Joined* out) {
+  const BindingFacts& binding = *joined.binding;
   ToProto(joined.state, out->mutable_session());
   out->set_encoding(std::string(encoding.id()));
   out->set_dimension(binding.dimension());
   out->set_point_count(binding.point_count());
-  out->set_vertex_count(binding.vertex_count());
-  AddRows(joined.pose.vertices, binding.dimension(), out->mutable_pose());
+  const int64_t rows = PoseRows(binding.rig());
+  out->set_vertex_count(rows);
+  AddRows(joined.pose.vertices.topRows(rows), binding.dimension(),
+          out->mutable_pose());
   out->set_stretch_blend(joined.pose.stretch_blend);
+}
+
+void ToProto(const RigChange& change, v1::RigChanged* out) {
+  const std::vector<int32_t>& previous = change.transfer.previous();
+  const Pose& pose = change.transfer.pose();
+  out->set_binding_id(change.binding_id);
+  out->set_revision(change.revision);
+  out->set_vertex_count(previous.size());
+  out->mutable_previous_vertices()->Add(previous.begin(), previous.end());
+  AddRows(pose.vertices.topRows(std::ssize(previous)), change.dimension,
+          out->mutable_pose());
+  out->set_stretch_blend(pose.stretch_blend);
+  out->set_largest_jump(change.largest_jump);
 }
 
 }  // namespace deform::server

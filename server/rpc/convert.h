@@ -6,10 +6,12 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
 #include "core/deform/pose.h"
+#include "core/weights/handle_edit.h"
 #include "deform/v1/binding.pb.h"
 #include "deform/v1/model.pb.h"
 #include "deform/v1/quality.pb.h"
@@ -29,11 +31,26 @@ absl::StatusOr<PageRequest> ToPageRequest(uint32_t page_size,
 absl::StatusOr<ModelUpload::Header> FromProto(const v1::ModelHeader& header);
 
 // BAD_NAME, MISSING_FIELD (scheme, rig), WRONG_LENGTH, BAD_DIMENSION,
-// INDEX_OUT_OF_RANGE, UNKNOWN_VALUE, and what Cage and Handles refuse.
-absl::StatusOr<BindSpec> FromProto(const v1::CreateBindingRequest& request);
+// INDEX_OUT_OF_RANGE, UNKNOWN_VALUE, WRONG_RIG, and what Cage and Handles
+// refuse. `model` is read if the request wants handles at its box.
+absl::StatusOr<BindSpec> FromProto(const v1::CreateBindingRequest& request,
+                                   const Mesh* model = nullptr);
 
 // WRONG_LENGTH, INDEX_OUT_OF_RANGE; CheckPoseUpdate() checks the rest.
 absl::StatusOr<PoseUpdate> FromProto(const v1::Pose& pose, int dimension);
+
+struct EditRequest {
+  std::string tenant;
+  std::string binding_id;
+  std::vector<std::string> sessions;  // Each once; empty: all, or none.
+  bool keep_sessions = false;
+};
+// All but the edits. BAD_NAME, CONTRADICTION (sessions named and kept).
+absl::StatusOr<EditRequest> FromProto(const v1::EditHandlesRequest& request);
+// MISSING_FIELD, WRONG_LENGTH; EditHandles() checks the rest.
+absl::StatusOr<std::vector<HandleEdit>> FromProto(
+    const google::protobuf::RepeatedPtrField<v1::HandleEdit>& edits,
+    int dimension);
 
 struct JoinRequest {
   std::string tenant;
@@ -53,7 +70,8 @@ void ToProto(const BindQuality& quality, v1::BindingQuality* out);
 void ToProto(const Rig& rig, v1::Rig* out);
 void ToProto(const SessionState& state, v1::Session* session);
 void ToProto(const CoordinateScheme& scheme, v1::Scheme* out);
-void ToProto(const Session& session, const Session::Joined& joined,
-             const FrameEncoding& encoding, v1::Joined* out);
+void ToProto(const Session::Joined& joined, const FrameEncoding& encoding,
+             v1::Joined* out);
+void ToProto(const RigChange& change, v1::RigChanged* out);
 
 }  // namespace deform::server

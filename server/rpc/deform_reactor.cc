@@ -107,7 +107,7 @@ void DeformReactor::HandleJoin(const v1::Join& join) {
         Session::Joined joined,
         session->Join(request.delivery, *request.encoding, weak_from_this()));
     v1::Joined message;
-    ToProto(*session, joined, *request.encoding, &message);
+    ToProto(joined, *request.encoding, &message);
     MutexLock lock(mutex_);
     joined_ = std::move(message);
     participant_ = std::move(joined.participant);
@@ -126,9 +126,9 @@ void DeformReactor::HandleJoin(const v1::Join& join) {
 
 void DeformReactor::HandlePose(const v1::Pose& pose) {
   Participant& participant = *this->participant();
-  participant.Submit(
-      pose.sequence(),
-      FromProto(pose, participant.session().binding().dimension()));
+  participant.Submit(pose.sequence(),
+                     FromProto(pose, participant.session().dimension()),
+                     pose.rig_changes());
   MutexLock lock(mutex_);
   ++poses_;
 }
@@ -179,6 +179,10 @@ void DeformReactor::StartNextWrite() {
   if (auto* frame = std::get_if<FrameToSend>(&*next)) {
     frame_ = FrameInProgress{.send = std::move(*frame)};
     WriteChunk();
+  } else if (auto* changed = std::get_if<RigChanged>(&*next)) {
+    v1::DeformResponse response;
+    ToProto(*changed->change, response.mutable_rig_changed());
+    Write(response);
   } else if (auto* rejection = std::get_if<Rejection>(&*next)) {
     v1::DeformResponse response;
     response.mutable_rejected()->set_sequence(rejection->sequence);

@@ -7,8 +7,25 @@ namespace deform::server {
 
 void Outbox::Offer(std::shared_ptr<const Frame> frame, uint64_t answers) {
   assert(!full());
-  if (delivery_ == Delivery::kLatest) frames_.clear();
-  frames_.push_back({std::move(frame), answers});
+  RigChanges changes;
+  if (delivery_ == Delivery::kLatest && !frames_.empty()) {
+    changes = std::move(frames_.back().changes);
+    frames_.clear();
+  }
+  changes.insert(changes.end(), announced_.begin(), announced_.end());
+  announced_.clear();
+  frames_.push_back({std::move(changes), std::move(frame), answers});
+}
+
+void Outbox::Announce(std::shared_ptr<const RigChange> change) {
+  assert(has_room_for_rig_changes());
+  announced_.push_back(std::move(change));
+}
+
+bool Outbox::has_room_for_rig_changes() const {
+  size_t waiting = announced_.size();
+  for (const Waiting& frame : frames_) waiting += frame.changes.size();
+  return waiting < kMaxRigChanges;
 }
 
 bool Outbox::full() const {
@@ -45,6 +62,11 @@ std::optional<Outgoing> Outbox::Take() {
     return Ended{*end_};
   }
   if (frames_.empty()) return std::nullopt;
+  if (RigChanges& changes = frames_.front().changes; !changes.empty()) {
+    RigChanged changed{std::move(changes.front())};
+    changes.pop_front();
+    return changed;
+  }
   return TakeFrame();
 }
 

@@ -6,9 +6,11 @@
 #include <memory>
 #include <optional>
 #include <variant>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "server/sessions/frame.h"
+#include "server/sessions/rig_change.h"
 
 namespace deform::server {
 
@@ -27,6 +29,10 @@ struct FrameToSend {
   uint64_t skipped_revisions = 0;
   bool keyframe = false;
 };
+// Comes before the first frame on the new rig.
+struct RigChanged {
+  std::shared_ptr<const RigChange> change;
+};
 struct Rejection {
   uint64_t sequence = 0;
   absl::Status status;
@@ -35,13 +41,14 @@ struct Rejection {
 struct Ended {
   absl::Status status;
 };
-using Outgoing = std::variant<FrameToSend, Rejection, Ended>;
+using Outgoing = std::variant<FrameToSend, RigChanged, Rejection, Ended>;
 
 // Not thread-safe; never holds more than a few frames and rejections.
 class Outbox {
  public:
   static constexpr size_t kMaxFrames = 4;
   static constexpr size_t kMaxRejections = 16;
+  static constexpr size_t kMaxRigChanges = 4;
 
   explicit Outbox(Delivery delivery) : delivery_(delivery) {}
 
@@ -52,6 +59,11 @@ class Outbox {
   void Offer(std::shared_ptr<const Frame> frame, uint64_t answers);
   // The next frame must wait until one is taken. Only with kEvery.
   bool full() const;
+
+  // Frames that are offered from now on are of the changed rig. Needs room for
+  // rig changes.
+  void Announce(std::shared_ptr<const RigChange> change);
+  bool has_room_for_rig_changes() const;
 
   // The pose `sequence` was accepted: a frame will answer it.
   void Expect(uint64_t sequence) { expected_ = sequence; }
@@ -71,7 +83,9 @@ class Outbox {
   std::optional<Outgoing> Take();
 
  private:
+  using RigChanges = std::deque<std::shared_ptr<const RigChange>>;
   struct Waiting {
+    RigChanges changes;  // To be told before.
     std::shared_ptr<const Frame> frame;
     uint64_t answers;
   };
@@ -81,6 +95,7 @@ class Outbox {
 
   const Delivery delivery_;
   std::deque<Waiting> frames_;
+  RigChanges announced_;  // Since the last frame.
   std::deque<Rejection> rejections_;
   std::optional<absl::Status> end_;
   bool ended_ = false;

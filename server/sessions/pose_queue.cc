@@ -33,6 +33,11 @@ std::optional<PoseQueue::Step> PoseQueue::Pop() {
   return step;
 }
 
+void PoseQueue::Transfer(const PoseTransfer& transfer) {
+  pose_ = transfer.Transfer(pose_);
+  for (Step& step : steps_) step.pose = transfer.Transfer(step.pose);
+}
+
 int64_t PoseQueue::OwnStepsOf(int64_t participant) const {
   return std::count_if(steps_.begin(), steps_.end(), [&](const Step& step) {
     return step.own_revision && step.answers[0].participant == participant;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/deform/pose.h"
+#include "core/deform/pose_transfer.h"
 
 namespace deform::server {
 
@@ -35,6 +36,9 @@ class PoseQueue {
 
   // The oldest step.
   std::optional<Step> Pop();
+
+  // The rig has changed: what waits goes on with the new one.
+  void Transfer(const PoseTransfer& transfer);
 
   void Clear() { steps_.clear(); }
   bool empty() const { return steps_.empty(); }

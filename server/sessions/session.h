@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -23,6 +24,7 @@
 #include "server/sessions/frame.h"
 #include "server/sessions/outbox.h"
 #include "server/sessions/pose_queue.h"
+#include "server/sessions/rig_change.h"
 
 namespace deform::server {
 
@@ -69,10 +71,14 @@ class Participant {
 
   const Session& session() const { return *session_; }
 
-  // Accepts the pose, or puts a rejection into the outbox. Rejected are, beside
-  // an `update` that is a status, what CheckPoseUpdate() refuses and
-  // InvalidArgument SEQUENCE_NOT_RISING. Needs WantsPoses().
-  void Submit(uint64_t sequence, const absl::StatusOr<PoseUpdate>& update);
+  // Accepts the pose, or puts a rejection into the outbox. `rig_changes`: how
+  // many RigChanged its sender knew of; what is meant for an older rig is taken
+  // over (PoseTransfer). Rejected are, beside an `update` that is a status,
+  // what CheckPoseUpdate() and PoseTransfer refuse and InvalidArgument
+  // SEQUENCE_NOT_RISING, RIG_CHANGED (too often), RIG_UNKNOWN (not yet so
+  // often). Needs WantsPoses().
+  void Submit(uint64_t sequence, const absl::StatusOr<PoseUpdate>& update,
+              uint64_t rig_changes = 0);
   // False while as many of its poses or rejections wait as may. The receiver
   // is woken when that changes.
   bool WantsPoses() const;
@@ -107,6 +113,8 @@ class Session : public std::enable_shared_from_this<Session> {
  public:
   // A participant's poses that may wait with Delivery::kEvery.
   static constexpr int64_t kMaxOwnSteps = 4;
+  // Changes of the rig over which poses are taken.
+  static constexpr size_t kMaxRigChanges = 16;
 
   // Starts at the rest pose, revision 0.
   static std::shared_ptr<Session> Create(std::string id, BindingInUse binding,
@@ -116,8 +124,7 @@ class Session : public std::enable_shared_from_this<Session> {
   const std::string& id() const { return id_; }
   // Raised by every server that takes the session over.
   uint64_t epoch() const { return 1; }
-  const std::string& binding_id() const { return binding_id_; }
-  const Binding& binding() const { return deformer_.binding(); }
+  int dimension() const { return dimension_; }
   SessionState state() const;
 
   // The pose of the present revision, and the binding it belongs to.
@@ -130,12 +137,18 @@ class Session : public std::enable_shared_from_this<Session> {
   struct Joined {
     std::unique_ptr<Participant> participant;
     SessionState state;
+    std::shared_ptr<const Binding> binding;
     Pose pose;
   };
   // A frame of the present state follows. ResourceExhausted
   // TOO_MANY_PARTICIPANTS; after End() or Drain() their status.
   absl::StatusOr<Joined> Join(Delivery delivery, const FrameEncoding& encoding,
                               std::weak_ptr<Receiver> receiver);
+
+  // Moves to the binding of edited handles, as a revision of its own, before
+  // the poses that wait: these are taken over. Participants are told before the
+  // first frame of it. The outcome goes to `move.done`.
+  void Move(RigMove move);
 
   // Ends every stream with `status` and lets the binding go.
   void End(const absl::Status& status);
@@ -145,7 +158,11 @@ class Session : public std::enable_shared_from_this<Session> {
 
   // What is to be done next.
   struct Step {
-    std::optional<PoseQueue::Step> pose;  // None: only frames are wanted.
+    // Neither: only frames are wanted.
+    std::optional<PoseQueue::Step> pose;
+    std::optional<RigMove> move;
+    std::shared_ptr<const RigChange> change;  // What the move made.
+    std::string binding_id;                   // Before it.
     std::vector<const FrameEncoding*> encodings;
     Deformer* deformer = nullptr;
     // Once the deformer has moved to the pose.
@@ -171,6 +188,7 @@ class Session : public std::enable_shared_from_this<Session> {
     Outbox outbox;
     const FrameEncoding* encoding = nullptr;
     std::weak_ptr<Receiver> receiver;
+    uint64_t first_change = 0;   // Changes of the rig before it joined.
     uint64_t last_sequence = 0;  // Of the poses accepted.
     uint64_t contained = 0;      // Newest pose that the revision contains.
     bool needs_frame = false;    // Has no frame of the revision to come.
@@ -182,30 +200,45 @@ class Session : public std::enable_shared_from_this<Session> {
           const SessionEnvironment& environment);
 
   SessionState StateLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  absl::Status CheckPose(const Seat& seat, uint64_t sequence,
-                         const absl::StatusOr<PoseUpdate>& update) const;
+  // The update as it is for the present rig.
+  absl::StatusOr<PoseUpdate> CheckPose(const Seat& seat, uint64_t sequence,
+                                       const absl::StatusOr<PoseUpdate>& update,
+                                       uint64_t rig_changes) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::StatusOr<PoseUpdate> TakeOver(PoseUpdate update, uint64_t changes) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool CanMove() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool CanStep() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool NeedsFrame() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Schedule() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   Receivers ReceiversLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
-  void Describe(const Step& step);
-  Receivers Publish(const std::optional<PoseQueue::Step>& step, Frames frames);
+  absl::Status ChangeRig(Step& step, ThreadPool* pool);
+  void Describe(const Pose& pose, const DeformReport& report,
+                std::chrono::microseconds time);
+  Receivers Publish(Step& step, Frames frames);
+  void PublishChange(Step& step) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const std::string id_;
   const std::string tenant_;
-  const std::string binding_id_;
+  const int dimension_;
   const absl::Time create_time_;
   const SessionEnvironment environment_;
-  const MemoryBudget::Reservation memory_;
 
   // Used by the running step only; the queue of the scheduler hands them from
   // one to the next.
-  Deformer deformer_;
+  std::unique_ptr<Deformer> deformer_;
   FrameInfo info_;
 
   mutable Mutex mutex_;
+  MemoryBudget::Reservation memory_ ABSL_GUARDED_BY(mutex_);
   BindingCatalogue::Lease lease_ ABSL_GUARDED_BY(mutex_);
+  std::string binding_id_ ABSL_GUARDED_BY(mutex_);
+  std::shared_ptr<const Binding> binding_ ABSL_GUARDED_BY(mutex_);
+  std::deque<RigMove> moves_ ABSL_GUARDED_BY(mutex_);
+  // The last of all changes of the rig.
+  std::deque<std::shared_ptr<const RigChange>> changes_ ABSL_GUARDED_BY(mutex_);
+  uint64_t change_count_ ABSL_GUARDED_BY(mutex_) = 0;
   PoseQueue queue_ ABSL_GUARDED_BY(mutex_);
   bool scheduled_ ABSL_GUARDED_BY(mutex_) = false;
   uint64_t revision_ ABSL_GUARDED_BY(mutex_) = 0;

@@ -61,15 +61,66 @@ absl::StatusOr<std::shared_ptr<Session>> SessionManager::Create(
                             sessions_.Insert(tenant, id, std::move(made)));
     session = std::move(inserted.first);
   }
-  if ((*session)->binding_id() != binding_id) {
-    return MakeError(absl::StatusCode::kAlreadyExists,
+  const std::string has = (*session)->state().binding_id;
+  if (has != binding_id) {
+    return MakeError(
+        absl::StatusCode::kAlreadyExists,
+        absl::StrCat("session ", Quoted(id), " has binding ", Quoted(has)),
+        {.reason = "SESSION_EXISTS",
+         .resource_type = "session",
+         .resource_name = id});
+  }
+  return session;
+}
+
+absl::Status SessionManager::CheckHave(const std::string& tenant,
+                                       const std::vector<std::string>& ids,
+                                       const std::string& binding_id) const {
+  for (const std::string& id : ids) {
+    DEFORM_ASSIGN_OR_RETURN(const auto session, sessions_.Find(tenant, id));
+    const std::string has = session->state().binding_id;
+    if (has == binding_id) continue;
+    return MakeError(absl::StatusCode::kFailedPrecondition,
                      absl::StrCat("session ", Quoted(id), " has binding ",
-                                  Quoted((*session)->binding_id())),
-                     {.reason = "SESSION_EXISTS",
+                                  Quoted(has), ", not ", Quoted(binding_id)),
+                     {.reason = "OTHER_BINDING",
                       .resource_type = "session",
                       .resource_name = id});
   }
-  return session;
+  return absl::OkStatus();
+}
+
+void SessionManager::Move(const BindingRecord& from, const BindingRecord& to,
+                          const std::vector<int32_t>& previous,
+                          std::vector<std::string> ids, RigMoves& moves) {
+  if (ids.empty()) {
+    for (const auto& session : sessions_.All()) {
+      const SessionState state = session->state();
+      if (state.tenant == from.tenant && state.binding_id == from.id) {
+        ids.push_back(state.id);
+      }
+    }
+  }
+  for (const std::string& id : ids) {
+    auto done = moves.Add(id);
+    const auto move = [&]() -> absl::Status {
+      DEFORM_ASSIGN_OR_RETURN(const auto session,
+                              sessions_.Find(from.tenant, id));
+      DEFORM_ASSIGN_OR_RETURN(
+          auto memory,
+          budget_.Reserve(Session::BytesFor(to.facts), "the session needs"));
+      DEFORM_ASSIGN_OR_RETURN(
+          auto binding,
+          bindings_.Use(to.tenant, to.id, absl::StrCat("session ", id)));
+      session->Move({.from = from.id,
+                     .to = std::move(binding),
+                     .memory = std::move(memory),
+                     .previous = previous,
+                     .done = done});
+      return absl::OkStatus();
+    };
+    if (const absl::Status status = move(); !status.ok()) done(status);
+  }
 }
 
 absl::Status SessionManager::Delete(const std::string& tenant,

@@ -4,11 +4,13 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/models/binding_registry.h"
 #include "server/models/catalogue.h"
+#include "server/sessions/rig_moves.h"
 #include "server/sessions/session.h"
 
 namespace deform::server {
@@ -41,6 +43,19 @@ class SessionManager {
   absl::StatusOr<std::shared_ptr<Session>> Create(
       const std::string& tenant, const std::string& binding_id,
       const std::string& id, KeepWaiting keep_waiting = WaitForever);
+
+  // NotFound SESSION_NOT_FOUND; FailedPrecondition OTHER_BINDING unless these
+  // sessions have that binding.
+  absl::Status CheckHave(const std::string& tenant,
+                         const std::vector<std::string>& ids,
+                         const std::string& binding_id) const;
+
+  // Has sessions of `from` move to `to`, a binding of its edited handles: those
+  // that are named, or all that it has now. `previous` as in EditedHandles.
+  // Does not wait; `moves` is told of each how it went.
+  void Move(const BindingRecord& from, const BindingRecord& to,
+            const std::vector<int32_t>& previous, std::vector<std::string> ids,
+            RigMoves& moves);
 
   // Ends its streams with NotFound SESSION_DELETED.
   absl::Status Delete(const std::string& tenant, const std::string& id);

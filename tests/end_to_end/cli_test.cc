@@ -6,6 +6,8 @@
 #include <fstream>
 #include <iterator>
 
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "client/cli/exit_code.h"
 #include "core/files/mesh_file.h"
 #include "tests/client/cli/cli_run.h"
@@ -105,6 +107,62 @@ TEST_F(Cli, BindSaysWhatToDoAboutPointsOutside) {
   EXPECT_EQ(reported["unbound"][0]["reason"], "EXTERIOR_NO_EXIT_FACE");
   EXPECT_EQ(reported["unbound"][0]["points"].size(),
             reported["unbound_count"].get<size_t>());
+}
+
+TEST_F(Cli, BindAddsTheBoxAndClampsOnRequest) {
+  Write("handles.obj", "v 0.1 0 0\nv -0.1 0 0\n");
+  Write("points.txt", "3 7\n11");
+  const std::string model = Register();
+  const CliResult refused =
+      Run({"bind", model, "--cage", Path("cube.obj"), "--add-box"});
+  EXPECT_EQ(refused.exit_code, kUsage);
+  const Json bound = RunJson({"bind", model, "--handles", Path("handles.obj"),
+                              "--add-box", "--clamp", Path("points.txt")});
+  EXPECT_EQ(bound["vertex_count"], 2);
+  EXPECT_EQ(bound["fixed_handle_count"], 8);
+  EXPECT_EQ(bound["clamped"], Json({3, 7, 11}));
+  const CliResult told = Run({"bind", model, "--handles", Path("handles.obj"),
+                              "--add-box", "--clamp", "11,3,7"});
+  EXPECT_THAT(told.out, HasSubstr(bound["binding_id"].get<std::string>()));
+  EXPECT_THAT(told.out, HasSubstr("2 vertices, 8 fixed handles, 0 normals"));
+  EXPECT_THAT(told.out, HasSubstr("clamped        3 points: 3, 7, 11\n"));
+  EXPECT_THAT(Run({"bind", model, "--handles", Path("handles.obj"), "--add-box",
+                   "--clamp", "1.5"})
+                  .err,
+              HasSubstr("--clamp: entry 0 (1.5) is not the number of a point"));
+}
+
+TEST_F(Cli, HandlesEditsABindingAndTellsWhatMoved) {
+  // One in the middle, and the corners of the cube.
+  Positions handles = Positions::Zero(9, 3);
+  handles.bottomRows(8) = Cube().vertices();
+  Write("handles.obj", ObjText(handles, Faces(0, 3)));
+  const std::string binding = RunJson(
+      {"bind", Register(), "--handles", Path("handles.obj")})["binding_id"];
+  const std::string session =
+      server_.client().CreateSession(binding)->session_id;
+  const Positions outward = 2 * handles.row(3);
+  const Json edited =
+      RunJson({"handles", binding, "--add", "0.1,0,0", "--move",
+               absl::StrCat("3,", absl::StrJoin(outward.reshaped(), ",")),
+               "--remove", "0"});
+  EXPECT_EQ(edited["previous_handles"], Json({1, 2, 3, 4, 5, 6, 7, 8, -1}));
+  EXPECT_EQ(edited["moved"][0]["session_id"], session);
+  EXPECT_EQ(edited["moved"][0]["revision"], 1);
+  const CliResult told =
+      Run({"handles", edited["binding_id"], "--add", "0,0,0.1"});
+  EXPECT_EQ(told.exit_code, kOk) << told.err;
+  EXPECT_THAT(told.out, HasSubstr("Newton steps a point"));
+  EXPECT_THAT(told.out, HasSubstr("session " + session +
+                                  " moved over at revision 2; largest jump"));
+  EXPECT_THAT(Run({"handles", binding}).err,
+              HasSubstr("say what to edit: --add, --move or --remove"));
+  EXPECT_THAT(Run({"handles", binding, "--add", "1,2"}).err,
+              HasSubstr("--add 1,2: 3 coordinates, and then perhaps a weight"));
+  EXPECT_THAT(Run({"handles", binding, "--move", "a,1,2,3"}).err,
+              HasSubstr("--move a,1,2,3: 'a' is no number"));
+  EXPECT_THAT(Run({"handles", binding, "--move", "0.5,1,2,3"}).err,
+              HasSubstr("it begins with the number of a handle"));
 }
 
 TEST_F(Cli, BindTurnsAnInsideOutCageOnRequest) {

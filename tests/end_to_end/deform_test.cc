@@ -77,6 +77,40 @@ TEST(Deform, EveryPoseGetsItsFrameInOrder) {
   sender.join();
 }
 
+TEST(Deform, LeavesFixedHandlesAndClampedPointsAtRest) {
+  RunningServer server;
+  const ModelInfo model = server.client().RegisterModel(Ball(), "b").value();
+  BindingSpec spec{.model_id = model.model_id, .scheme = "s_cc"};
+  spec.rig = RigArrays(RigKind::kHandles, 3, Positions::Zero(1, 3), Faces());
+  spec.add_box_handles = true;
+  spec.clamped = {8, 3};
+  const BindingInfo binding = server.client().CreateBinding(spec).value();
+  EXPECT_EQ(binding.vertex_count, 1);
+  EXPECT_EQ(binding.fixed_handle_count, 8);
+  EXPECT_EQ(binding.clamped, (std::vector<int64_t>{3, 8}));
+  EXPECT_EQ(server.client().GetRig(binding.binding_id)->fixed.rows(), 8);
+  const SessionInfo session =
+      server.client().CreateSession(binding.binding_id).value();
+  auto stream = server.client().Deform(session.session_id).value();
+  EXPECT_EQ(stream.joined().vertex_count, 1);
+  // A corner of the box cannot be moved, the handle in the middle can.
+  stream.Send({.vertices = {1}, .positions = Positions::Ones(1, 3)}).value();
+  Frame frame;
+  absl::Status refused;
+  while (refused.ok()) refused = stream.NextFrame(frame);
+  EXPECT_EQ(DetailOf(refused).reason, "FIXED_HANDLE");
+  const uint64_t sequence =
+      stream.Send({.positions = Positions::Constant(1, 3, 0.1)}).value();
+  do {
+    ASSERT_TRUE(stream.NextFrame(frame).ok());
+  } while (frame.answers_sequence < sequence);
+  const Positions moved = frame.DoublePositions() - Ball().positions();
+  EXPECT_LT(moved.row(3).norm(), kFrameTolerance);
+  EXPECT_LT(moved.row(8).norm(), kFrameTolerance);
+  EXPECT_GT(moved.row(4).norm(), 0.01);
+  EXPECT_LT(moved.row(4).norm(), 0.1);
+}
+
 TEST(Deform, MergesPartialPoses) {
   RunningServer server;
   auto stream = server.client().Deform(server.BallSession()).value();

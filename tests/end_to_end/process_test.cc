@@ -16,6 +16,7 @@
 #include "client/cpp/client.h"
 #include "core/base/error.h"
 #include "deform/v1/binding.grpc.pb.h"
+#include "tests/end_to_end/long_binding.h"
 #include "tests/end_to_end/raw_call.h"
 #include "tests/end_to_end/running_server.h"
 
@@ -149,19 +150,7 @@ class LongBinding {
   explicit LongBinding(const std::string& address)
       : stub_(v1::BindingService::NewStub(PlainChannel(address))) {
     Client client = Client::Connect(address).value();
-    v1::CreateBindingRequest request;
-    request.set_model_id(
-        client.RegisterModel(MeshOf(Icosphere(0.5, 6)), "").value().model_id);
-    request.set_scheme("green");
-    auto* cage = request.mutable_rig()->mutable_cage();
-    cage->set_dimension(3);
-    const Shape shape = Icosphere(1, 3);
-    cage->mutable_vertices()->Add(
-        shape.positions.data(),
-        shape.positions.data() + shape.positions.size());
-    cage->mutable_corners()->Add(shape.faces.data(),
-                                 shape.faces.data() + shape.faces.size());
-    reader_ = stub_->CreateBinding(&context_, request);
+    reader_ = stub_->CreateBinding(&context_, LongBindingRequest(client));
     v1::CreateBindingResponse response;
     EXPECT_TRUE(reader_->Read(&response));
   }
@@ -179,7 +168,7 @@ class LongBinding {
 };
 
 TEST(Deformd, CancelsWhatOutlastsTheDrainTimeout) {
-  Daemon daemon({"--drain-timeout", "0.2"});
+  Daemon daemon({"--drain-timeout", "0.05"});
   LongBinding binding(daemon.address());
   daemon.Signal(SIGTERM);
   EXPECT_FALSE(binding.Finish().ok());

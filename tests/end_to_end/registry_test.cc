@@ -9,6 +9,7 @@
 #include "core/base/error.h"
 #include "deform/v1/binding.grpc.pb.h"
 #include "deform/v1/model.grpc.pb.h"
+#include "tests/end_to_end/long_binding.h"
 #include "tests/end_to_end/raw_call.h"
 #include "tests/end_to_end/running_server.h"
 
@@ -237,22 +238,6 @@ TEST(Bindings, RefuseACageWithAHoleByName) {
   EXPECT_EQ(DetailOf(status).field, "rig.cage.corners");
 }
 
-// Some seconds of work for the machine: 40,962 points, 1,280 faces.
-v1::CreateBindingRequest LongBinding(Client& client) {
-  v1::CreateBindingRequest request;
-  request.set_model_id(
-      client.RegisterModel(MeshOf(Icosphere(0.5, 6)), "").value().model_id);
-  request.set_scheme("green");
-  auto* cage = request.mutable_rig()->mutable_cage();
-  cage->set_dimension(3);
-  const Shape shape = Icosphere(1, 3);
-  cage->mutable_vertices()->Add(
-      shape.positions.data(), shape.positions.data() + shape.positions.size());
-  cage->mutable_corners()->Add(shape.faces.data(),
-                               shape.faces.data() + shape.faces.size());
-  return request;
-}
-
 // Deletes the model as soon as nothing computes with it any more.
 void AwaitFree(Client& client, const std::string& model_id) {
   while (!client.DeleteModel(model_id).ok()) {
@@ -262,7 +247,7 @@ void AwaitFree(Client& client, const std::string& model_id) {
 
 TEST(Bindings, StopWhenTheCallerCancels) {
   RunningServer server;
-  const v1::CreateBindingRequest request = LongBinding(server.client());
+  const v1::CreateBindingRequest request = LongBindingRequest(server.client());
   const auto stub = v1::BindingService::NewStub(PlainChannel(server.address()));
   grpc::ClientContext context;
   const auto reader = stub->CreateBinding(&context, request);
@@ -279,7 +264,7 @@ TEST(Bindings, StopWhenTheCallerCancels) {
 
 TEST(Bindings, StopAtTheDeadline) {
   RunningServer server;
-  const v1::CreateBindingRequest request = LongBinding(server.client());
+  const v1::CreateBindingRequest request = LongBindingRequest(server.client());
   const auto stub = v1::BindingService::NewStub(PlainChannel(server.address()));
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() +

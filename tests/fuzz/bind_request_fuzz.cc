@@ -10,7 +10,9 @@ namespace {
 void Check(const uint8_t* data, size_t size) {
   v1::CreateBindingRequest request;
   if (!request.ParseFromArray(data, static_cast<int>(size))) return;
-  const auto spec = FromProto(request);
+  static const Mesh model =
+      Mesh::Create(3, Positions::Identity(3, 3), Faces(0, 3)).value();
+  const auto spec = FromProto(request, &model);
   if (!spec.ok()) {
     FUZZ_EXPECT(spec.status().code() == absl::StatusCode::kInvalidArgument);
     FUZZ_EXPECT(!DetailOf(spec.status()).reason.empty());
@@ -21,6 +23,7 @@ void Check(const uint8_t* data, size_t size) {
   // What was accepted is accepted when it comes back.
   v1::CreateBindingRequest again = request;
   again.clear_rig();
+  again.set_add_box_handles(false);
   ToProto(spec->rig, again.mutable_rig());
   FUZZ_EXPECT(FromProto(again).ok());
 }

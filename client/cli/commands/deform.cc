@@ -39,6 +39,7 @@ absl::Status Draw(const Options& options, const Stage& stage,
   picture.dimension = stage.binding().dimension;
   picture.faces = model.faces;
   picture.rig_faces = stage.rig().faces;
+  picture.marked = stage.binding().clamped;
   picture.panels = {
       {absl::StrCat("at rest, ", Thousands(model.positions.rows()), " points"),
        model.positions, stage.rig().vertices},
@@ -54,6 +55,7 @@ void Tell(const Options& options, const Stage& stage, const Frame& frame,
                      {"binding_id", binding.binding_id},
                      {"point_count", binding.point_count},
                      {"unbound_count", binding.unbound_count},
+                     {"clamped_count", binding.clamped_count},
                      {"compute_seconds", binding.compute_seconds},
                      {"deform_us", frame.deform_us},
                      {"exit_mismatch", frame.exit_mismatch}};
@@ -66,6 +68,10 @@ void Tell(const Options& options, const Stage& stage, const Frame& frame,
       out << absl::StrFormat(
           "%s points are not bound and stay where they are\n",
           Thousands(binding.unbound_count));
+    }
+    if (binding.clamped_count > 0) {
+      out << absl::StrFormat("%s points are clamped\n",
+                             Thousands(binding.clamped_count));
     }
     for (const std::string* path : {&options.out, &options.png}) {
       if (!path->empty()) out << "wrote " << *path << "\n";

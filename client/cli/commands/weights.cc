@@ -104,7 +104,7 @@ absl::Status ForRows(
 Json Shape(const Options& options, const BindingInfo& binding) {
   return {{"binding_id", binding.binding_id},
           {"precision", options.in_double ? "float64" : "float32"},
-          {"vertex_count", binding.vertex_count},
+          {"vertex_count", binding.vertex_count + binding.fixed_handle_count},
           {"normal_count", binding.normal_count}};
 }
 
@@ -147,9 +147,9 @@ absl::Status WriteInto(Client& client, const Options& options,
   json["out"] = options.out;
   console.Result(json, [&](std::ostream& out) {
     out << "wrote " << options.out << ": " << Thousands(count) << " rows of "
-        << Thousands(binding.vertex_count) << " vertex and "
-        << Thousands(binding.normal_count) << " normal weights, "
-        << json["precision"].get<std::string>() << "\n";
+        << Thousands(binding.vertex_count + binding.fixed_handle_count)
+        << " vertex and " << Thousands(binding.normal_count)
+        << " normal weights, " << json["precision"].get<std::string>() << "\n";
   });
   return absl::OkStatus();
 }

@@ -78,7 +78,7 @@ class TranslationScheme final : public CoordinateScheme {
                           "scheme t_cc has no lambda; it belongs to s_cc");
     }
     DEFORM_RETURN_IF_ERROR(
-        CheckHandleWeights(options.handle_weights, handles->size()));
+        CheckHandleWeights(options.handle_weights, handles->free_count()));
     return MakeCelestialEvaluator(CelestialKind::kTranslation, *handles,
                                   options.handle_weights);
   }

@@ -40,6 +40,42 @@ std::vector<int32_t> Ordered(const PositionsRef& points) {
   return order;
 }
 
+// Where searches start: where that of the point before ended, or, with known
+// solutions of a similar rig, at the point's own, carried along by as much as
+// the one of the point before was off. Whichever would have been nearer for
+// the point before is taken, so that known solutions do not mislead for long.
+class Starts {
+ public:
+  explicit Starts(const Solutions& known) : known_(known) {}
+
+  Vec3 For(int64_t i) const {
+    return trusted_ && Knows(i) ? Vec3(Known(i) + shift_) : last_;
+  }
+
+  // The search of point i ended at `y`; 0 if it has no solution.
+  void Learn(int64_t i, const Vec3& y) {
+    if (Knows(i) && !y.isZero(0)) {
+      const Vec3 shift = y - Known(i);
+      trusted_ = (shift - shift_).squaredNorm() <= (y - last_).squaredNorm();
+      shift_ = shift;
+    }
+    last_ = y;
+  }
+
+ private:
+  bool Knows(int64_t i) const {
+    return known_.rows() > 0 && !known_.row(i).isZero(0);
+  }
+  Vec3 Known(int64_t i) const {
+    return known_.row(i).cast<double>().transpose();
+  }
+
+  const Solutions& known_;
+  Vec3 last_ = Vec3::Zero();
+  Vec3 shift_ = Vec3::Zero();
+  bool trusted_ = true;
+};
+
 class CelestialEvaluator final : public WeightEvaluator {
  public:
   CelestialEvaluator(CelestialKind kind, const Handles& handles,
@@ -60,6 +96,7 @@ class CelestialEvaluator final : public WeightEvaluator {
     block.states.assign(static_cast<size_t>(n), PointState::kInside);
     block.iterations.assign(static_cast<size_t>(n), 0);
     block.residuals.assign(static_cast<size_t>(n), 0.0);
+    block.solutions.setZero(n, 3);
     if (n == 0) return;
     const std::vector<int32_t> order = Ordered(points);
     if (way_ == CelestialWay::kLanes) {
@@ -68,9 +105,9 @@ class CelestialEvaluator final : public WeightEvaluator {
     }
     Directions directions;
     directions.Resize(handles_.rows());
-    WideVec3 start = WideVec3::Zero();
+    Starts starts(block.known);
     for (const int32_t i : order) {
-      start = EvaluatePoint(i, points.row(i), start, directions, block);
+      EvaluatePoint(i, points.row(i), starts, directions, block);
     }
   }
 
@@ -97,13 +134,14 @@ class CelestialEvaluator final : public WeightEvaluator {
         .residual = residual.get()};
     Directions directions;
     directions.Resize(handles);
-    Vec3 start = Vec3::Zero();
-    WideVec3 hard = WideVec3::Zero();  // Where the last plain search ended.
+    Starts starts(block.known);
+    Starts hard(block.known);  // Of plain searches.
     const auto n = std::ssize(order);
     for (int64_t first = 0; first < n; first += lanes) {
       for (int lane = 0; lane < lanes; ++lane) {
         // The last point fills what is left of its group.
         const int32_t i = order[std::min(first + lane, n - 1)];
+        const Vec3 start = starts.For(i);
         for (int d = 0; d < 3; ++d) {
           places[d * lanes + lane] = points(i, d);
           solution[d * lanes + lane] = start[d];
@@ -119,34 +157,42 @@ class CelestialEvaluator final : public WeightEvaluator {
           }
           block.iterations[i] = static_cast<uint16_t>(job.steps);
           block.residuals[i] = residual[lane];
+          for (int d = 0; d < 3; ++d) {
+            block.solutions(i, d) =
+                static_cast<float>(solution[d * lanes + lane]);
+          }
           continue;
         }
-        hard = EvaluatePoint(i, points.row(i), hard, directions, block);
+        EvaluatePoint(i, points.row(i), hard, directions, block);
       }
-      // All start where the point just before them ended.
-      const bool solved = job.solved >> (lanes - 1) & 1;
-      for (int d = 0; d < 3; ++d) {
-        start[d] = solved ? solution[d * lanes + lanes - 1] : 0;
+      // All of the next group start from the point just before them.
+      const int last = lanes - 1;
+      Vec3 y = Vec3::Zero();
+      for (int d = 0; d < 3 && (job.solved >> last & 1) != 0; ++d) {
+        y[d] = solution[d * lanes + last];
       }
+      starts.Learn(order[std::min(first + last, n - 1)], y);
     }
   }
 
-  // Returns where the search ended: a start for the next.
-  WideVec3 EvaluatePoint(int64_t i, const Vec3& point, const WideVec3& start,
-                         Directions& directions, WeightBlock& block) const {
+  void EvaluatePoint(int64_t i, const Vec3& point, Starts& starts,
+                     Directions& directions, WeightBlock& block) const {
     const std::span<double> row(block.vertex.row(i).data(),
                                 static_cast<size_t>(handles_.rows()));
     if (!LookFrom(point, directions)) {
       SitOnHandle(point, row);
-      return WideVec3::Zero();
+      starts.Learn(i, Vec3::Zero());
+      return;
     }
     const CelestialPoint solved =
-        SolveCelestial(kind_, directions, s_, Uncertainty(point), start, row);
+        SolveCelestial(kind_, directions, s_, Uncertainty(point),
+                       starts.For(i).cast<long double>(), row);
     block.states[i] = solved.state;
     block.iterations[i] =
         static_cast<uint16_t>(std::min(solved.iterations, 0xffff));
     block.residuals[i] = solved.residual;
-    return solved.y;
+    block.solutions.row(i) = solved.y.cast<float>().transpose();
+    starts.Learn(i, solved.y.cast<double>());
   }
 
   // Returns false if the point is at a handle.

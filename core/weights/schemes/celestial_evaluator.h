@@ -15,7 +15,8 @@ enum class CelestialWay {
   kPlain,  // One by one: the judge of the other.
 };
 
-// `s` are the user weights of T-CC, one for each handle and in range, or empty.
+// `s` are the user weights of T-CC, one for each free handle and in range, or
+// empty.
 std::unique_ptr<const WeightEvaluator> MakeCelestialEvaluator(
     CelestialKind kind, const Handles& handles, std::vector<double> s,
     CelestialWay way = CelestialWay::kLanes);

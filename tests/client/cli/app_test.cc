@@ -87,7 +87,7 @@ INSTANTIATE_TEST_SUITE_P(
         {"Nothing", {}, "see 'deformctl --help'"},
         {"UnknownCommand",
          {"dance", "--json=no", "m"},
-         "there is no command 'dance', only register, bind, deform, "},
+         "there is no command 'dance', only register, bind, "},
         {"UnknownOption",
          {"list", "models", "--colour"},
          "--colour; see 'deformctl list --help'"},

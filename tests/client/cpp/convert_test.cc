@@ -78,6 +78,21 @@ TEST(BindingRequest, KeepsHandlesAndTheirWeights) {
   EXPECT_THAT(request.options().handle_weights(), ElementsAre(0.5, 0));
 }
 
+TEST(BindingRequest, KeepsFixedHandlesTheBoxAndClampedPoints) {
+  BindingSpec spec;
+  spec.rig = RigArrays(RigKind::kHandles, 2, Rows({{1, 2, 0}}), {});
+  spec.rig.fixed = Rows({{5, 6, 0}});
+  spec.add_box_handles = true;
+  spec.clamped = {4, 7};
+  const v1::CreateBindingRequest request = ToProto(spec, "");
+  EXPECT_THAT(request.rig().handles().fixed_positions(), ElementsAre(5, 6));
+  EXPECT_TRUE(request.add_box_handles());
+  EXPECT_THAT(request.clamped_points(), ElementsAre(4, 7));
+  const RigArrays back = FromProto(request.rig()).value();
+  EXPECT_EQ(back.vertices, spec.rig.vertices);
+  EXPECT_EQ(back.fixed, spec.rig.fixed);
+}
+
 TEST(PoseMessage, CarriesTheBlendOnlyWhenItIsSet) {
   PoseUpdate update{.vertices = {4}, .positions = Rows({{1, 2, 3}})};
   EXPECT_FALSE(ToProto(update, 3, 1).has_stretch_blend());

@@ -78,6 +78,39 @@ TEST(Pose, MergesByVertexAndTheLastPlaceWins) {
   EXPECT_EQ(pose.vertices.row(1), rest.row(1));
 }
 
+// Two handles among the corners of a cube, which are fixed.
+Rig TwoFreeHandles() {
+  Positions free(2, 3);
+  free << 0, 0, 0, 0.5, 0, 0;
+  return Handles::Create(3, free, BoxCage().vertices()).value();
+}
+
+TEST(Pose, OfFixedHandlesIsRefused) {
+  const PoseUpdate update{.vertices = {1, 2},
+                          .positions = Positions::Ones(2, 3)};
+  const absl::Status status = CheckPoseUpdate(update, TwoFreeHandles());
+  EXPECT_EQ(DetailOf(status).reason, "FIXED_HANDLE");
+  EXPECT_EQ(DetailOf(status).field, "pose.vertices");
+  EXPECT_EQ(status.message(),
+            "pose entry 1 moves handle 2, which is fixed, as all from 2 on");
+  const PoseUpdate beyond{.vertices = {10}, .positions = Positions::Ones(1, 3)};
+  EXPECT_EQ(CheckPoseUpdate(beyond, TwoFreeHandles()).message(),
+            "pose entry 0 refers to vertex 10 of 2");
+}
+
+TEST(Pose, IsFullWithoutTheFixedHandles) {
+  const Rig rig = TwoFreeHandles();
+  const PoseUpdate all{.positions = Positions::Ones(2, 3)};
+  ASSERT_TRUE(CheckPoseUpdate(all, rig).ok());
+  Pose pose = RestPose(rig);
+  ApplyPoseUpdate(all, pose);
+  EXPECT_EQ(pose.vertices.topRows(2), Positions::Ones(2, 3));
+  EXPECT_EQ(pose.vertices.bottomRows(8), BoxCage().vertices());
+  EXPECT_EQ(
+      CheckPoseUpdate({.positions = Positions::Ones(10, 3)}, rig).message(),
+      "pose has 10 positions, but the rig has 2 vertices");
+}
+
 TEST(Pose, KeepsTheBlendUntilItIsChanged) {
   Pose pose = RestPose(Rig(BoxCage()));
   EXPECT_EQ(pose.stretch_blend, 1);

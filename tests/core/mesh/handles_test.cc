@@ -116,5 +116,74 @@ TEST(Handles, AreRefusedOnOneLineOrPoint) {
                 "all 5 handles lie at one point");
 }
 
+TEST(Handles, HaveTheFixedOnesLast) {
+  Positions fixed(2, 3);
+  fixed << 3, 3, 3, -3, -3, -3;
+  const Handles handles = Handles::Create(3, Corners(), fixed).value();
+  EXPECT_EQ(handles.size(), 10);
+  EXPECT_EQ(handles.free_count(), 8);
+  EXPECT_EQ(handles.fixed_count(), 2);
+  EXPECT_EQ(handles.positions().topRows(8), Corners());
+  EXPECT_EQ(handles.positions().bottomRows(2), fixed);
+  EXPECT_DOUBLE_EQ(handles.diagonal(), 6 * std::sqrt(3));
+}
+
+TEST(Handles, MayBeFewWhereFixedOnesSpanTheSpace) {
+  EXPECT_EQ(Handles::Create(3, Positions::Zero(1, 3), Corners()).status(),
+            absl::OkStatus());
+}
+
+TEST(Handles, AreRefusedWhenNoneIsFree) {
+  const auto handles = Handles::Create(3, Positions(0, 3), Corners());
+  EXPECT_EQ(DetailOf(handles.status()).reason, "DEGENERATE_HANDLES");
+  EXPECT_EQ(handles.status().message(),
+            "all handles are fixed: at least one must be free to be posed");
+}
+
+TEST(Handles, AreRefusedForAFixedOneThatIsWrong) {
+  Positions fixed = Positions::Zero(2, 3);
+  fixed(1, 2) = std::numeric_limits<double>::infinity();
+  absl::Status status = Handles::Create(3, Corners(), fixed).status();
+  EXPECT_EQ(DetailOf(status).field, "rig.handles.fixed_positions");
+  EXPECT_EQ(status.message(),
+            "fixed handle 1 has a coordinate that is not finite");
+  fixed(1, 2) = 1;
+  status = Handles::Create(2, Plane(), fixed).status();
+  EXPECT_EQ(status.message(), "fixed handle 1 of a 2D rig has z = 1, not 0");
+}
+
+TEST(BoxHandles, AreTheCornersOfABoxOnePointSixTimesAsLarge) {
+  const Mesh model = MeshOf(Cuboid({1, 2, 3}, {2, 4, 6}));
+  const Positions corners = BoxHandles(model);
+  ASSERT_EQ(corners.rows(), 8);
+  const Box box = BoxOf(corners);
+  EXPECT_TRUE(box.center().isApprox(model.box().center(), 1e-15));
+  EXPECT_TRUE((box.max - box.min).isApprox(1.6 * Vec3(1, 2, 3), 1e-15));
+  // All of them, each once.
+  const Mesh square = MeshOf(Grid2d(2), 2);
+  const Positions flat = BoxHandles(square);
+  ASSERT_EQ(flat.rows(), 4);
+  EXPECT_EQ(flat.col(2), Eigen::VectorXd::Zero(4));
+  EXPECT_EQ(Handles::Create(2, flat).status(), absl::OkStatus());
+}
+
+TEST(BoxHandles, ContainStrictlyWhateverTheModel) {
+  Shape flat{Grid2d(3).positions, Faces(0, 3)};
+  Shape far = flat;
+  far.positions.rowwise() += Eigen::RowVector3d(1e12, -1e12, 5);
+  const Shape point{Positions::Zero(1, 3), Faces(0, 3)};
+  const Shape far_point{Positions::Constant(1, 3, 1e9), Faces(0, 3)};
+  for (const Shape& shape : {flat, far, point, far_point}) {
+    const Mesh model = MeshOf(shape);
+    const Positions corners = BoxHandles(model);
+    const Box box = BoxOf(corners);
+    for (int d = 0; d < 3; ++d) {
+      EXPECT_LT(box.min[d], model.box().min[d]);
+      EXPECT_GT(box.max[d], model.box().max[d]);
+    }
+    EXPECT_EQ(Handles::Create(3, corners).status(), absl::OkStatus());
+  }
+}
+
 }  // namespace
 }  // namespace deform

@@ -75,6 +75,17 @@ class BindingRegistryTest : public testing::Test {
                       });
   }
 
+  // The id of what `spec` asks for.
+  std::string IdOf(const BindSpec& spec) {
+    bind_.Permit(1);
+    return bindings_->Create(spec)
+        .value()
+        ->Wait(kLong)
+        .value()
+        .value()
+        .record->id;
+  }
+
   BindSpec Spec(double cage_size = 2) {
     return {.tenant = "t",
             .model_id = model_id_,
@@ -111,6 +122,21 @@ TEST_F(BindingRegistryTest, DifferentRigsAreDifferentBindings) {
   const auto a = *bindings_->Create(Spec(2)).value()->Wait(kLong).value();
   const auto b = *bindings_->Create(Spec(3)).value()->Wait(kLong).value();
   EXPECT_NE(a.record->id, b.record->id);
+}
+
+TEST_F(BindingRegistryTest, ClampedPointsAndFixedHandlesAreContent) {
+  BindSpec spec = Spec();
+  const std::string plain = IdOf(spec);
+  spec.clamped = {3};
+  EXPECT_NE(IdOf(spec), plain);
+  // The same places, of which the last rest.
+  const Positions places = RestVertices(Spec().rig);
+  spec.scheme = "s_cc";
+  spec.rig = Handles::Create(3, places).value();
+  const std::string free = IdOf(spec);
+  spec.rig =
+      Handles::Create(3, places.topRows(7), places.bottomRows(1)).value();
+  EXPECT_NE(IdOf(spec), free);
 }
 
 TEST_F(BindingRegistryTest, CallsThatAskTheSameShareOneComputation) {

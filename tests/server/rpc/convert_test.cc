@@ -59,6 +59,49 @@ TEST(ConvertBinding, TakesHandlesAndOptions) {
   EXPECT_EQ(spec.unbindable, Unbindable::kReport);
 }
 
+TEST(ConvertBinding, AddsHandlesAtTheBoxOfTheModel) {
+  const Mesh model = MeshOf(Icosphere(0.5, 1));
+  v1::CreateBindingRequest request = GoodRequest();
+  auto* handles = request.mutable_rig()->mutable_handles();
+  handles->set_dimension(3);
+  for (const double x : {0.0, 0.1, 0.2}) handles->add_positions(x);
+  request.set_add_box_handles(true);
+  const Rig rig = FromProto(request, &model).value().rig;
+  EXPECT_EQ(std::get<Handles>(rig).free_count(), 1);
+  EXPECT_EQ(RestVertices(rig).bottomRows(8), BoxHandles(model));
+  // Told back, they are what was asked for.
+  v1::CreateBindingRequest again = request;
+  again.set_add_box_handles(false);
+  again.clear_rig();
+  ToProto(rig, again.mutable_rig());
+  EXPECT_EQ(again.rig().handles().positions_size(), 3);
+  EXPECT_EQ(again.rig().handles().fixed_positions_size(), 24);
+  const Rig told = FromProto(again).value().rig;
+  EXPECT_EQ(RestVertices(told), RestVertices(rig));
+  EXPECT_EQ(PoseRows(told), 1);
+}
+
+TEST(ConvertBinding, AddsNoBoxToARigOfAnotherKindOrDimension) {
+  const Mesh model = MeshOf(Grid2d(2), 2);
+  v1::CreateBindingRequest request = GoodRequest();
+  request.set_add_box_handles(true);
+  absl::Status status = FromProto(request, &model).status();
+  EXPECT_EQ(DetailOf(status).reason, "WRONG_RIG");
+  EXPECT_EQ(DetailOf(status).field, "add_box_handles");
+  EXPECT_EQ(status.message(),
+            "the corners of a box can be added to handles; a cage has none");
+  request.mutable_rig()->mutable_handles()->set_dimension(3);
+  status = FromProto(request, &model).status();
+  EXPECT_EQ(DetailOf(status).reason, "DIMENSION_MISMATCH");
+  EXPECT_EQ(status.message(), "the model is 2D and its rig 3D");
+}
+
+TEST(ConvertBinding, SortsClampedPoints) {
+  v1::CreateBindingRequest request = GoodRequest();
+  for (const uint64_t point : {9, 2, 9, 0}) request.add_clamped_points(point);
+  EXPECT_EQ(FromProto(request)->clamped, (std::vector<int64_t>{0, 2, 9}));
+}
+
 TEST(ConvertBinding, TakesExits) {
   v1::CreateBindingRequest request = GoodRequest();
   request.mutable_exits()->mutable_automatic();
@@ -154,6 +197,16 @@ INSTANTIATE_TEST_SUITE_P(
            r.mutable_rig()->mutable_handles()->set_dimension(3);
          },
          "DEGENERATE_HANDLES", "rig.handles.positions", ""},
+        {"OddFixedHandles",
+         [](Request& r) {
+           r.mutable_rig()->mutable_handles()->set_dimension(3);
+           r.mutable_rig()->mutable_handles()->add_fixed_positions(1);
+         },
+         "WRONG_LENGTH", "rig.handles.fixed_positions", "has 1 numbers"},
+        {"HugeClampedPoint",
+         [](Request& r) { r.add_clamped_points(~uint64_t{0}); },
+         "INDEX_OUT_OF_RANGE", "clamped_points",
+         "entry 0 is 18446744073709551615, beyond every point"},
         {"HugeExit",
          [](Request& r) {
            r.mutable_exits()->mutable_faces()->add_faces(1u << 31);

@@ -43,6 +43,31 @@ TEST(LatestOutbox, CountsTheRevisionsItSkipped) {
   EXPECT_EQ(TakeFrame(outbox).skipped_revisions, 0u);
 }
 
+TEST(LatestOutbox, TellsEveryChangeOfTheRigBeforeTheNewestFrame) {
+  Outbox outbox(Delivery::kLatest);
+  outbox.Offer(FrameOf(0), 0);
+  for (uint64_t r = 1; r <= Outbox::kMaxRigChanges; ++r) {
+    EXPECT_TRUE(outbox.has_room_for_rig_changes());
+    outbox.Announce(nullptr);
+    outbox.Offer(FrameOf(r), 0);
+  }
+  EXPECT_FALSE(outbox.has_room_for_rig_changes());
+  for (size_t i = 0; i < Outbox::kMaxRigChanges; ++i) {
+    EXPECT_TRUE(std::holds_alternative<RigChanged>(outbox.Take().value()));
+  }
+  EXPECT_EQ(TakeFrame(outbox).frame->info.revision, Outbox::kMaxRigChanges);
+}
+
+TEST(EveryOutbox, TellsAChangeOfTheRigBetweenTheFrames) {
+  Outbox outbox(Delivery::kEvery);
+  outbox.Offer(FrameOf(0), 0);
+  outbox.Announce(nullptr);
+  outbox.Offer(FrameOf(1), 0);
+  EXPECT_EQ(TakeFrame(outbox).frame->info.revision, 0u);
+  EXPECT_TRUE(std::holds_alternative<RigChanged>(outbox.Take().value()));
+  EXPECT_EQ(TakeFrame(outbox).frame->info.revision, 1u);
+}
+
 TEST(EveryOutbox, KeepsAllFramesInOrderAndSaysWhenItIsFull) {
   Outbox outbox(Delivery::kEvery);
   for (uint64_t r = 0; r < Outbox::kMaxFrames; ++r) {

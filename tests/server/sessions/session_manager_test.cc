@@ -82,7 +82,12 @@ TEST_F(SessionManagerTest, WaitsForWeightsThatWereEvicted) {
   rooms_.EvictWeights();
   const auto session = sessions_.Create("t", rooms_.binding_id, "");
   ASSERT_TRUE(session.ok()) << session.status();
-  EXPECT_EQ((*session)->binding().weights().points(), kBallPoints);
+  EXPECT_TRUE(rooms_.bindings()
+                  .catalogue()
+                  .Find("t", rooms_.binding_id)
+                  .value()
+                  ->weights->state()
+                  .resident);
 }
 
 TEST_F(SessionManagerTest, GivesUpWaitingWithItsCaller) {

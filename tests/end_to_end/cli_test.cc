@@ -13,6 +13,7 @@
 #include "tests/client/cli/cli_run.h"
 #include "tests/client/verify/hand_made.h"
 #include "tests/end_to_end/running_server.h"
+#include "tests/support/temporary_folder.h"
 
 namespace deform::cli {
 namespace {
@@ -26,11 +27,7 @@ using testing::StartsWith;
 
 class Cli : public testing::Test {
  protected:
-  Cli()
-      : folder_(testing::TempDir() + "/" +
-                testing::UnitTest::GetInstance()->current_test_info()->name()) {
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
+  Cli() {
     Write("ball.obj", ObjText(Ball().positions(), Ball().faces()));
     Write("cube.obj", ObjText(Cube().vertices(), Cube().faces()));
     Positions posed = Cube().vertices();
@@ -38,10 +35,9 @@ class Cli : public testing::Test {
     Write("moved.obj", ObjText(posed, Cube().faces()));
   }
 
-  std::string Path(const std::string& name) { return folder_ + "/" + name; }
+  std::string Path(const std::string& name) { return folder_.Path(name); }
   std::string Write(const std::string& name, const std::string& text) {
-    std::ofstream(Path(name), std::ios::binary) << text;
-    return Path(name);
+    return folder_.Write(name, text);
   }
   std::string Read(const std::string& name) {
     std::ifstream stream(Path(name), std::ios::binary);
@@ -73,7 +69,7 @@ class Cli : public testing::Test {
   }
 
   RunningServer server_;
-  const std::string folder_;
+  const TemporaryFolder folder_;
 };
 
 TEST_F(Cli, RegisterPrintsTheIdAlone) {
@@ -344,7 +340,7 @@ TEST_F(Cli, TenantsDoNotSeeEachOther) {
 TEST_F(Cli, VerifyPassesAServerThatIsRight) {
   Write("triangle.json", TriangleCase().dump());
   Write("index.json", R"([{"file": "triangle.json"}])");
-  const CliResult result = Run({"verify", folder_});
+  const CliResult result = Run({"verify", folder_.Path("")});
   EXPECT_EQ(result.exit_code, kOk) << result.out << result.err;
   EXPECT_THAT(result.out, HasSubstr("scc.hand"));
   EXPECT_THAT(result.out, HasSubstr("OK: 1 cases, 2 queries, 0 failures"));
@@ -355,7 +351,7 @@ TEST_F(Cli, VerifyFailsAWrongWeightAndNamesTheQuery) {
   nlohmann::json wrong = TriangleCase();
   wrong["queries"][0]["expected"]["alpha"][1] = "0.333333333";
   Write("triangle.json", wrong.dump());
-  const CliResult result = Run({"verify", folder_});
+  const CliResult result = Run({"verify", folder_.Path("")});
   EXPECT_EQ(result.exit_code, kCheckFailed);
   EXPECT_THAT(result.out,
               HasSubstr("FAIL triangle query 0: vertex weight 1 is off by"));
@@ -367,7 +363,7 @@ TEST_F(Cli, VerifyFailsAWrongPosition) {
   nlohmann::json wrong = TriangleCase();
   wrong["queries"][0]["expected"]["deformed"]["moved"][0] = "2.001";
   Write("triangle.json", wrong.dump());
-  const CliResult result = Run({"verify", folder_, "--json"});
+  const CliResult result = Run({"verify", folder_.Path(""), "--json"});
   EXPECT_EQ(result.exit_code, kCheckFailed);
   EXPECT_EQ(result.err, "");
   const Json report = result.json();
@@ -382,7 +378,7 @@ TEST_F(Cli, VerifyFailsAnErrorThatDidNotCome) {
   nlohmann::json wrong = TriangleCase();
   wrong["queries"][1]["point"] = {"0.5", "0.5"};
   Write("triangle.json", wrong.dump());
-  EXPECT_THAT(Run({"verify", folder_}).out,
+  EXPECT_THAT(Run({"verify", folder_.Path("")}).out,
               HasSubstr("query 1: expected error outside_hull, got a result"));
 }
 
@@ -392,7 +388,7 @@ TEST_F(Cli, VerifyFailsWhatItCannotRead) {
   nlohmann::json unreadable = TriangleCase();
   unreadable["queries"][0].erase("point");
   Write("c.json", unreadable.dump());
-  const CliResult result = Run({"verify", folder_});
+  const CliResult result = Run({"verify", folder_.Path("")});
   EXPECT_EQ(result.exit_code, kCheckFailed);
   EXPECT_THAT(result.out, HasSubstr("b.json: is not JSON"));
   EXPECT_THAT(result.out,
@@ -400,11 +396,11 @@ TEST_F(Cli, VerifyFailsWhatItCannotRead) {
 }
 
 TEST_F(Cli, VerifyFailsAnEmptyDirectory) {
-  const CliResult empty = Run({"verify", folder_});
+  const CliResult empty = Run({"verify", folder_.Path("")});
   EXPECT_EQ(empty.exit_code, kCheckFailed);
   EXPECT_THAT(empty.err, HasSubstr("holds no case"));
   Write("triangle.json", TriangleCase().dump());
-  const CliResult group = Run({"verify", folder_, "--group", "gc3d"});
+  const CliResult group = Run({"verify", folder_.Path(""), "--group", "gc3d"});
   EXPECT_EQ(group.exit_code, kCheckFailed);
   EXPECT_THAT(group.err, HasSubstr("in a group that begins with gc3d"));
   EXPECT_EQ(Run({"verify", Path("missing")}).exit_code, kCheckFailed);
@@ -421,7 +417,7 @@ TEST_F(Cli, VerifySendsWhatIsInvalidAndWantsItRefused) {
   nlohmann::json point = TriangleCase();
   point["queries"][1]["point"] = {"inf", "0"};
   Write("point.json", point.dump());
-  const CliResult result = Run({"verify", folder_});
+  const CliResult result = Run({"verify", folder_.Path("")});
   EXPECT_EQ(result.exit_code, kOk) << result.out;
   EXPECT_THAT(result.out, HasSubstr("2 cases, 4 queries, 0 failures"));
 }
@@ -432,7 +428,7 @@ TEST_F(Cli, VerifyDeletesNothingOfOthers) {
   points << 1, 1, 0, 7, 7, 0;  // The model of the case.
   const std::string id =
       server_.client().RegisterModel({2, points, Faces()}, "mine")->model_id;
-  EXPECT_EQ(Run({"verify", folder_}).exit_code, kOk);
+  EXPECT_EQ(Run({"verify", folder_.Path("")}).exit_code, kOk);
   EXPECT_TRUE(server_.client().GetModel(id).ok());
 }
 
@@ -599,9 +595,10 @@ TEST_F(Cli, AnInterruptedVerifyLeavesNothingBehind) {
   std::ostringstream err;
   Interruption interruption;
   interruption.requested = true;
-  EXPECT_EQ(RunDeformctl({"--server", server_.address(), "verify", folder_},
-                         {out, err, false, interruption}),
-            kInterrupted);
+  EXPECT_EQ(
+      RunDeformctl({"--server", server_.address(), "verify", folder_.Path("")},
+                   {out, err, false, interruption}),
+      kInterrupted);
   EXPECT_TRUE(ServerIsEmpty());
 }
 

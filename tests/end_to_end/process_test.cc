@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -19,6 +18,7 @@
 #include "tests/end_to_end/long_binding.h"
 #include "tests/end_to_end/raw_call.h"
 #include "tests/end_to_end/running_server.h"
+#include "tests/support/temporary_folder.h"
 
 namespace deform {
 namespace {
@@ -121,8 +121,7 @@ TEST(Deformd, SaysWhereItListensAndServesThere) {
 }
 
 TEST(Deformd, ListensOnAUnixSocket) {
-  const std::string path =
-      "unix:" + testing::TempDir() + "deformd-" + std::to_string(getpid());
+  const std::string path = "unix:" + Temporary().Path("socket");
   Process daemon({"--listen", path, "--log-level", "off"});
   EXPECT_EQ(daemon.ReadLine(), "listening on " + path + "\n");
   EXPECT_TRUE(Client::Connect(path)->ListModels().ok());
@@ -234,8 +233,7 @@ TEST(Deformd, PrintsItsConfiguration) {
 
 TEST(Deformd, RefusesABadConfigurationByFileAndLine) {
   const std::string file =
-      testing::TempDir() + "deformd-" + std::to_string(getpid()) + ".toml";
-  std::ofstream(file) << "\nmax-sessions = \"many\"\n";
+      Temporary().Write("deformd.toml", "\nmax-sessions = \"many\"\n");
   Process process({"--config", file});
   EXPECT_EQ(process.ReadErrors(),
             "deformd: " + file + ":2: max-sessions: is a whole number\n");

@@ -3,10 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <vector>
 
 #include "core/base/error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace deform::server {
 namespace {
@@ -19,9 +19,7 @@ absl::StatusOr<CommandLine> Read(std::vector<const char*> flags) {
 }
 
 std::string FileWith(const std::string& text) {
-  const std::string path = testing::TempDir() + "deformd_options_test.toml";
-  std::ofstream(path) << text;
-  return path;
+  return Temporary().Write("deformd.toml", text);
 }
 
 TEST(Options, HaveDefaultsThatWork) {

@@ -11,6 +11,7 @@
 #include "core/files/mesh_file.h"
 #include "core/mesh/cage.h"
 #include "tests/client/cli/cli_run.h"
+#include "tests/support/temporary_folder.h"
 
 namespace deform::cli {
 namespace {
@@ -24,18 +25,12 @@ using testing::StartsWith;
 // No server listens here.
 constexpr char kNowhere[] = "unix:/nonexistent/deformd.sock";
 
-std::string WriteTemporary(const std::string& name, const std::string& text) {
-  const std::string path = testing::TempDir() + "/" + name;
-  std::ofstream(path, std::ios::binary) << text;
-  return path;
-}
-
 std::string CubeObj() {
-  return WriteTemporary("cube.obj",
-                        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n"
-                        "v 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n"
-                        "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\n"
-                        "f 1 5 7 3\nf 2 4 8 6\n");
+  return Temporary().Write("cube.obj",
+                           "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n"
+                           "v 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n"
+                           "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\n"
+                           "f 1 5 7 3\nf 2 4 8 6\n");
 }
 
 TEST(Help, ListsTheCommandsAndExitCodes) {
@@ -258,11 +253,11 @@ TEST(Server, IsTakenFromTheEnvironment) {
 }
 
 TEST(Files, AreReadBeforeTheServerIsAsked) {
-  const std::string broken = WriteTemporary("broken.obj", "v 1 2\n");
+  const std::string broken = Temporary().Write("broken.obj", "v 1 2\n");
   for (const std::vector<std::string>& arguments :
        std::vector<std::vector<std::string>>{
            {"register", broken},
-           {"picture", broken, "--out", testing::TempDir() + "/x.png"},
+           {"picture", broken, "--out", Temporary().Path("x.png")},
            {"deform", "--model-file", broken, "--cage", "c.obj", "--pose",
             "p.obj", "--out", "o.obj"}}) {
     const CliResult result = RunCli(arguments);
@@ -275,7 +270,7 @@ TEST(Files, AreReadBeforeTheServerIsAsked) {
 }
 
 TEST(Cage, IsMadeWithoutAServer) {
-  const std::string path = testing::TempDir() + "/cube_cage.obj";
+  const std::string path = Temporary().Path("cube_cage.obj");
   const CliResult result =
       RunCli({"cage", CubeObj(), "--faces", "60", "--out", path, "--json"});
   ASSERT_EQ(result.exit_code, kOk) << result.out;
@@ -285,8 +280,8 @@ TEST(Cage, IsMadeWithoutAServer) {
 }
 
 TEST(Cage, OfAFlatFileAreLoops) {
-  const std::string path = testing::TempDir() + "/square_cage.obj";
-  const std::string square = WriteTemporary(
+  const std::string path = Temporary().Path("square_cage.obj");
+  const std::string square = Temporary().Write(
       "square.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n");
   const CliResult result =
       RunCli({"cage", square, "--margin", "0.1", "--out", path});
@@ -303,16 +298,16 @@ TEST(Cage, OfAFlatFileAreLoops) {
 }
 
 TEST(Cage, SaysWhyThereIsNone) {
-  const std::string out = testing::TempDir() + "/x.obj";
-  const CliResult point =
-      RunCli({"cage", WriteTemporary("point.obj", "v 1 2 3\n"), "--out", out});
+  const std::string out = Temporary().Path("x.obj");
+  const CliResult point = RunCli(
+      {"cage", Temporary().Write("point.obj", "v 1 2 3\n"), "--out", out});
   EXPECT_EQ(point.exit_code, kBadFile);
   EXPECT_THAT(point.err, HasSubstr("(MODEL_WITHOUT_EXTENT)"));
   EXPECT_THAT(point.err, HasSubstr("point.obj: "));
 }
 
 TEST(Generate, WritesModelAndRigsWithoutAServer) {
-  const std::string folder = testing::TempDir() + "/";
+  const std::string folder = Temporary().Path("");
   const CliResult result =
       RunCli({"generate", "bar", "--points", "300", "--out", folder + "bar.obj",
               "--cage", folder + "bar_cage.obj", "--handles",
@@ -328,7 +323,7 @@ TEST(Generate, WritesModelAndRigsWithoutAServer) {
 }
 
 TEST(Generate, WritesLoopsIn2D) {
-  const std::string folder = testing::TempDir() + "/";
+  const std::string folder = Temporary().Path("");
   EXPECT_EQ(RunCli({"generate", "angle", "--out", folder + "angle.obj",
                     "--cage", folder + "angle_cage.obj"})
                 .exit_code,
@@ -339,7 +334,7 @@ TEST(Generate, WritesLoopsIn2D) {
 }
 
 TEST(Picture, IsDrawnWithoutAServer) {
-  const std::string path = testing::TempDir() + "/cube.png";
+  const std::string path = Temporary().Path("cube.png");
   const CliResult result =
       RunCli({"picture", CubeObj(), "--cage", CubeObj(), "--posed", CubeObj(),
               "--posed-cage", CubeObj(), "--caption", "rest", "--width", "100",
@@ -355,8 +350,8 @@ TEST(Picture, IsDrawnWithoutAServer) {
 }
 
 TEST(Picture, SaysWhatDoesNotFit) {
-  const std::string two = WriteTemporary("two.obj", "v 0 0 0\nv 1 1 1\n");
-  const std::string out = testing::TempDir() + "/x.png";
+  const std::string two = Temporary().Write("two.obj", "v 0 0 0\nv 1 1 1\n");
+  const std::string out = Temporary().Path("x.png");
   const CliResult posed =
       RunCli({"picture", CubeObj(), "--posed", two, "--out", out});
   EXPECT_EQ(posed.exit_code, kBadFile);
@@ -391,7 +386,7 @@ INSTANTIATE_TEST_SUITE_P(Shells, CompletionTest,
 
 TEST(Completion, WorksInBash) {
   const std::string path =
-      WriteTemporary("completion.bash", RunCli({"completion", "bash"}).out);
+      Temporary().Write("completion.bash", RunCli({"completion", "bash"}).out);
   const auto complete = [&](const std::string& words, int word) {
     const std::string command = "bash -c 'source " + path + "; COMP_WORDS=(" +
                                 words +

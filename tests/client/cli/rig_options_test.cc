@@ -3,10 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
-
 #include "client/cli/exit_code.h"
 #include "client/cli/files.h"
+#include "tests/support/temporary_folder.h"
 
 namespace deform::cli {
 namespace {
@@ -14,21 +13,15 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-std::string WriteTemporary(const std::string& name, const std::string& text) {
-  const std::string path = testing::TempDir() + "/" + name;
-  std::ofstream(path, std::ios::binary) << text;
-  return path;
-}
-
 std::string Tetrahedron() {
-  return WriteTemporary("tetrahedron.obj",
-                        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
-                        "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  return Temporary().Write("tetrahedron.obj",
+                           "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+                           "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
 }
 
 std::string Square() {
-  return WriteTemporary("square.obj",
-                        "v 0 0 5\nv 1 0 5\nv 1 1 5\nv 0 1 5\nl 1 4 3 2 1\n");
+  return Temporary().Write("square.obj",
+                           "v 0 0 5\nv 1 0 5\nv 1 1 5\nv 0 1 5\nl 1 4 3 2 1\n");
 }
 
 TEST(Exits, AreNoneAutomaticOrNamed) {
@@ -68,7 +61,7 @@ TEST(Spec, OfHandlesTakesTheirWeightsFromAListOrAFile) {
   EXPECT_EQ(spec.scheme, "s_cc");
   EXPECT_EQ(spec.rig.kind, RigKind::kHandles);
   EXPECT_THAT(spec.options.handle_weights, ElementsAre(0, 0.5, 1, 2));
-  options.handle_weights = WriteTemporary("weights.txt", "3\n4, 5\t6\n");
+  options.handle_weights = Temporary().Write("weights.txt", "3\n4, 5\t6\n");
   EXPECT_THAT(LoadSpec(options, 3)->options.handle_weights,
               ElementsAre(3, 4, 5, 6));
 }
@@ -76,10 +69,10 @@ TEST(Spec, OfHandlesTakesTheirWeightsFromAListOrAFile) {
 TEST(Spec, TakesAnExitFaceForEachPoint) {
   RigOptions options;
   options.cage = Tetrahedron();
-  options.exit_per_point = WriteTemporary("exits.txt", "-1\n0\n3\n");
+  options.exit_per_point = Temporary().Write("exits.txt", "-1\n0\n3\n");
   EXPECT_THAT(LoadSpec(options, 3)->exits.face_of_point, ElementsAre(-1, 0, 3));
   for (const char* text : {"0.5", "-2", "1e12", "nan"}) {
-    options.exit_per_point = WriteTemporary("exits.txt", text);
+    options.exit_per_point = Temporary().Write("exits.txt", text);
     const auto spec = LoadSpec(options, 3);
     ASSERT_FALSE(spec.ok()) << text;
     EXPECT_EQ(ExitCodeOf(spec.status()), kBadFile);
@@ -107,14 +100,14 @@ TEST(Spec, SaysWhatIsWrongWithAFile) {
   RigOptions options;
   EXPECT_THAT(std::string(LoadSpec(options, 3).status().message()),
               HasSubstr("--cage FILE or --handles FILE"));
-  options.cage = WriteTemporary("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 1\n");
+  options.cage = Temporary().Write("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 1\n");
   EXPECT_THAT(std::string(LoadSpec(options, 3).status().message()),
               HasSubstr("points.obj: has no faces"));
-  options.cage = WriteTemporary("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+  options.cage = Temporary().Write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
   EXPECT_THAT(std::string(LoadSpec(options, 2).status().message()),
               HasSubstr("flat.obj: has no polylines"));
   options.cage =
-      WriteTemporary("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2 3\n");
+      Temporary().Write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2 3\n");
   const auto open = LoadSpec(options, 2);
   EXPECT_EQ(ExitCodeOf(open.status()), kBadFile);
   EXPECT_THAT(std::string(open.status().message()), HasSubstr("open.obj: "));
@@ -132,7 +125,7 @@ TEST(Dimension, Is2OnlyIfModelAndRigAreFlat) {
 }
 
 TEST(Numbers, NameTheEntryThatIsNone) {
-  const auto numbers = LoadNumbers(WriteTemporary("n.txt", "1 2,x"));
+  const auto numbers = LoadNumbers(Temporary().Write("n.txt", "1 2,x"));
   ASSERT_FALSE(numbers.ok());
   EXPECT_THAT(std::string(numbers.status().message()),
               HasSubstr("n.txt: entry 2 ('x') is not a number"));

@@ -1,8 +1,6 @@
 #include "core/files/mesh_file.h"
 
-#include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <string>
 
@@ -10,33 +8,26 @@
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace deform {
 namespace {
 
 using testing::HasSubstr;
 
-std::string WriteTemporary(const std::string& name, const std::string& bytes) {
-  const std::string path = testing::TempDir() + name;
-  std::ofstream(path, std::ios::binary) << bytes;
-  return path;
-}
-
 TEST(ReadMeshFile, GoesByTheExtensionInEitherCase) {
   const std::string path =
-      WriteTemporary("mesh_file_test.OBJ", "v 1 2 3\nv 4 5 6\n");
+      Temporary().Write("mesh_file_test.OBJ", "v 1 2 3\nv 4 5 6\n");
   const auto file = ReadMeshFile(path);
   ASSERT_TRUE(file.ok()) << file.status();
   EXPECT_EQ(file->format, "obj");
   EXPECT_EQ(file->positions(1, 1), 5);
-  std::remove(path.c_str());
 }
 
 TEST(ReadMeshFile, SaysWhichFileIsBad) {
-  const std::string path = WriteTemporary("mesh_file_test.obj", "v 1 2\n");
+  const std::string path = Temporary().Write("mesh_file_test.obj", "v 1 2\n");
   EXPECT_EQ(ReadMeshFile(path).status().message(),
             path + ": line 1: a coordinate is missing");
-  std::remove(path.c_str());
 }
 
 TEST(ReadMeshFile, RefusesWhatIsNotThere) {
@@ -47,10 +38,9 @@ TEST(ReadMeshFile, RefusesWhatIsNotThere) {
 }
 
 TEST(ReadMeshFile, RefusesADirectory) {
-  const std::string path = testing::TempDir() + "mesh_file_test.ply";
+  const std::string path = Temporary().Path("mesh_file_test.ply");
   std::filesystem::create_directory(path);
   EXPECT_EQ(ReadMeshFile(path).status().code(), absl::StatusCode::kNotFound);
-  std::filesystem::remove(path);
 }
 
 TEST(ReadMeshFile, RefusesUnknownFormatsAndListsTheKnown) {

@@ -18,6 +18,11 @@ CompressedSums::CompressedSums(const CompressedWeights& weights)
       top_(weights.top_size(), 0.0),
       sums_(weights.slot_count() * 3, 0.0F) {}
 
+// Adding a column costs about as much as applying one.
+bool CompressedSums::PrefersAdding(std::span<const int32_t> columns) const {
+  return std::ssize(columns) * 2 <= weights_.columns();
+}
+
 void CompressedSums::Copy(int64_t first, int64_t count, double* out) const {
   for (int64_t i = first; i < first + count; ++i) {
     const int64_t slot = weights_.slot(i);

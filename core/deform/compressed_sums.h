@@ -12,6 +12,7 @@ namespace deform {
 class CompressedSums : public WeightedSums {
  public:
   explicit CompressedSums(const CompressedWeights& weights);
+  bool PrefersAdding(std::span<const int32_t> columns) const override;
   void Copy(int64_t first, int64_t count, double* out) const override;
 
   // The sums of all changes are CompressedSums.

@@ -109,9 +109,7 @@ std::vector<int32_t> Deformer::MovedVertices(const Pose& pose) const {
 
 bool Deformer::PrefersFull(const std::vector<int32_t>& changed,
                            const Columns& next) const {
-  // Adding a column costs about as much as applying one, and reads and writes
-  // the sums besides.
-  if (static_cast<int64_t>(changed.size()) * 2 > columns_.rows()) return true;
+  if (!sums_->PrefersAdding(changed)) return true;
   if (steps_since_full_ >= kMaxSteps) return true;
   // Float weights lose digits in proportion to the residuals. A fresh fit
   // leaves them within about the size of the pose; when steps have carried the

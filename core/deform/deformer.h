@@ -67,12 +67,12 @@ class Deformer {
  private:
   friend void MoveTogether(std::span<DeformJob> jobs, ThreadPool* pool);
 
-  // What a step does to the sums: adds columns x values, or, if full, makes
-  // them anew from the residuals of all columns.
+  // What a step does to the sums: adds values x the columns that moved, or, if
+  // full, makes them anew from the residuals of all columns.
   struct Change {
     bool full = false;
-    std::vector<int32_t> columns;
-    std::vector<double> values;  // 3 a column.
+    std::vector<int32_t> columns;  // That moved.
+    std::vector<double> values;    // 3 for each of them; of all, if full.
   };
 
   // Everything of a step but the sums.

@@ -1,15 +1,16 @@
 // Sums over dense weights.
 #pragma once
 
-#include <vector>
-
+#include "core/deform/moved_columns.h"
 #include "core/deform/weighted_sums.h"
+#include "core/kernels/zeroed_array.h"
 
 namespace deform {
 
 class DenseSums : public WeightedSums {
  public:
   explicit DenseSums(const WeightTiles& weights);
+  bool PrefersAdding(std::span<const int32_t> columns) const override;
   void Copy(int64_t first, int64_t count, double* out) const override;
 
   // The sums of all changes are DenseSums.
@@ -17,7 +18,12 @@ class DenseSums : public WeightedSums {
                     std::span<const SumsChange> changes, ThreadPool* pool);
 
  private:
-  std::vector<double> sums_;  // tiles x kTileSums
+  // A step of part of the columns: tiles [first, first + count).
+  struct Part;
+
+  const WeightTiles& weights_;
+  ZeroedArray<double> sums_;  // tiles x kTileSums
+  MovedColumns moved_;
 };
 
 }  // namespace deform

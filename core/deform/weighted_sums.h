@@ -17,6 +17,10 @@ class WeightedSums {
   static std::unique_ptr<WeightedSums> Create(const Binding& binding);
   virtual ~WeightedSums() = default;
 
+  // Whether a step that changes these columns (sorted) should add them; else
+  // making the sums anew costs less.
+  virtual bool PrefersAdding(std::span<const int32_t> columns) const = 0;
+
   // Of points [first, first + count): 3 numbers each.
   virtual void Copy(int64_t first, int64_t count, double* out) const = 0;
 };
@@ -26,8 +30,8 @@ struct SumsChange {
   WeightedSums* sums = nullptr;
   // Replaces the sums by weights x values; else adds to them.
   bool full = false;
-  std::span<const int32_t> columns;  // If not full: which; else all.
-  std::span<const double> values;    // 3 a column.
+  std::span<const int32_t> columns;  // Those that moved, sorted.
+  std::span<const double> values;    // 3 for each of them; of all, if full.
 };
 
 // Makes all changes, of different sums of this binding, in one walk over its

@@ -123,38 +123,91 @@ void ApplyTiles(const float* tiles, int64_t count, int64_t columns,
   }
 }
 
-void AddTileColumns(const float* tiles, int64_t count, int64_t columns,
-                    const int32_t* index, int64_t changed, const double* delta,
-                    double* out) {
-  const hn::Rebind<float, decltype(kDoubles)> halves;
-  for (int64_t t = 0; t < count; ++t, out += kTileSums) {
-    const float* tile = tiles + t * columns * kTilePoints;
-    Doubles sums[3][kDoubleVectors];
+// The sums of a tile, kept in registers while columns are added.
+struct TileSums {
+  HWY_INLINE void Load(const double* from) {
     for (int d = 0; d < 3; ++d) {
       for (int v = 0; v < kDoubleVectors; ++v) {
         sums[d][v] =
-            hn::LoadU(kDoubles, out + d * kTilePoints + v * kDoubleLanes);
+            hn::LoadU(kDoubles, from + d * kTilePoints + v * kDoubleLanes);
       }
     }
-    for (int64_t k = 0; k < changed; ++k) {
-      const float* weights =
-          tile + (index != nullptr ? int64_t{index[k]} : k) * kTilePoints;
-      if (t + 1 < count) hwy::Prefetch(weights + columns * kTilePoints);
-      for (int v = 0; v < kDoubleVectors; ++v) {
-        const Doubles w = hn::PromoteTo(
-            kDoubles, hn::LoadU(halves, weights + v * kDoubleLanes));
-        for (int d = 0; d < 3; ++d) {
-          sums[d][v] =
-              hn::MulAdd(w, hn::Set(kDoubles, delta[k * 3 + d]), sums[d][v]);
-        }
+  }
+  HWY_INLINE void Add(const float* HWY_RESTRICT weights,
+                      const double* HWY_RESTRICT delta) {
+    const hn::Rebind<float, decltype(kDoubles)> halves;
+    for (int v = 0; v < kDoubleVectors; ++v) {
+      const Doubles w = hn::PromoteTo(
+          kDoubles, hn::LoadU(halves, weights + v * kDoubleLanes));
+      for (int d = 0; d < 3; ++d) {
+        sums[d][v] = hn::MulAdd(w, hn::Set(kDoubles, delta[d]), sums[d][v]);
       }
     }
+  }
+  HWY_INLINE void Store(double* to) const {
     for (int d = 0; d < 3; ++d) {
       for (int v = 0; v < kDoubleVectors; ++v) {
         hn::StoreU(sums[d][v], kDoubles,
-                   out + d * kTilePoints + v * kDoubleLanes);
+                   to + d * kTilePoints + v * kDoubleLanes);
       }
     }
+  }
+
+  Doubles sums[3][kDoubleVectors];
+};
+
+constexpr int kAddWalks = 12 * kDoubleVectors < kRegisters ? 2 : 1;
+
+// The first `changed` columns, read forward, of `kTiles` tiles, `stride` tiles
+// apart.
+template <int kTiles>
+HWY_INLINE void AddFirst(const float* HWY_RESTRICT tiles, int64_t stride,
+                         int64_t columns, int64_t changed,
+                         const double* HWY_RESTRICT delta,
+                         double* HWY_RESTRICT out) {
+  TileSums sums[kTiles];
+  for (int t = 0; t < kTiles; ++t) sums[t].Load(out + t * stride * kTileSums);
+  for (int64_t c = 0; c < changed; ++c) {
+    for (int t = 0; t < kTiles; ++t) {
+      const float* weights = tiles + (t * stride * columns + c) * kTilePoints;
+      hwy::Prefetch(reinterpret_cast<const char*>(weights) +
+                    2 * kPrefetchBytes);
+      sums[t].Add(weights, delta + c * 3);
+    }
+  }
+  for (int t = 0; t < kTiles; ++t) sums[t].Store(out + t * stride * kTileSums);
+}
+
+void AddFirstColumns(const float* tiles, int64_t count, int64_t columns,
+                     int64_t changed, const double* delta, double* out) {
+  const int64_t stride = count / kAddWalks;
+  for (int64_t t = 0; t < stride; ++t) {
+    AddFirst<kAddWalks>(tiles + t * columns * kTilePoints, stride, columns,
+                        changed, delta, out + t * kTileSums);
+  }
+  for (int64_t t = stride * kAddWalks; t < count; ++t) {
+    AddFirst<1>(tiles + t * columns * kTilePoints, 1, columns, changed, delta,
+                out + t * kTileSums);
+  }
+}
+
+void AddTileColumns(const float* tiles, int64_t count, int64_t columns,
+                    const int32_t* index, int64_t changed, const double* delta,
+                    double* out) {
+  if (index == nullptr) {
+    AddFirstColumns(tiles, count, columns, changed, delta, out);
+    return;
+  }
+  for (int64_t t = 0; t < count; ++t, out += kTileSums) {
+    const float* tile = tiles + t * columns * kTilePoints;
+    TileSums sums;
+    sums.Load(out);
+    for (int64_t k = 0; k < changed; ++k) {
+      const float* weights = tile + int64_t{index[k]} * kTilePoints;
+      if (t + 1 < count) hwy::Prefetch(weights + columns * kTilePoints);
+      sums.Add(weights, delta + k * 3);
+    }
+    sums.Store(out);
   }
 }
 

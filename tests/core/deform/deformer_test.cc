@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "core/deform/moved_columns.h"
 #include "tests/core/deform/test_cages.h"
 
 namespace deform {
@@ -177,6 +178,37 @@ TEST(Deformer, StepsEqualFullPassesAfterManyRandomEdits) {
     }
   }
   EXPECT_GT(steps, 90000);
+}
+
+TEST(Deformer, DragsEqualFullPasses) {
+  const auto binding = BindGreen(PointsInside(3, 20000), BoxCage(2));
+  ASSERT_GT(binding->weights().bytes(), MovedColumns::kWorthCopying);
+  Deformer deformer(binding, nullptr);
+  std::mt19937 random(8);
+  std::uniform_real_distribution<double> uniform(-0.2, 0.2);
+  const Positions& rest = RestVertices(binding->rig());
+  Pose pose = RestPose(binding->rig());
+  int64_t added = 0;
+  for (int drag = 0; drag < 12; ++drag) {
+    // One participant drags a vertex, another a second one, in turns or at
+    // once; some drags are of vertices that were dragged before.
+    const int64_t first = drag % 7, second = (3 * drag) % 5 + 7;
+    for (int step = 0; step < 8; ++step) {
+      for (const int64_t v : {first, second}) {
+        if (drag % 3 == 1 && step % 2 != v % 2) continue;
+        if (drag % 3 == 2 && v == second) continue;
+        for (int d = 0; d < 3; ++d) {
+          pose.vertices(v, d) = rest(v, d) + uniform(random);
+        }
+      }
+      added += deformer.MoveTo(pose).full ? 0 : 1;
+    }
+    Deformer full(binding, nullptr);
+    full.MoveTo(pose, Deformer::Path::kFull);
+    EXPECT_LT(LargestDifference(deformer.positions(), full.positions()),
+              1e-6 * DiagonalOf(binding->rig()));
+  }
+  EXPECT_GT(added, 60);
 }
 
 TEST(Deformer, FitsAnewWhenStepsHaveCarriedTheCageAway) {

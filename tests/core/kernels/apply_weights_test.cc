@@ -107,6 +107,26 @@ TEST_P(ApplyWeights, AddsSomeColumnsAsThePlainVersionDoes) {
   });
 }
 
+TEST_P(ApplyWeights, AddsTheFirstColumnsAsThePlainVersionDoes) {
+  const int64_t tiles = GetParam().tiles;
+  const int64_t columns = GetParam().columns;
+  const Problem problem(tiles, columns, 1);
+  for (const int64_t first : {columns, columns / 2}) {
+    std::vector<double> judge(tiles * kTileSums, 5.0);
+    AddTileColumnsPlain(problem.weights.tile(0), tiles, columns, nullptr, first,
+                        problem.column_double.data(), judge.data());
+    ForEachInstructionSet([&] {
+      std::vector<double> out(judge.size() + 1, 5.0);
+      AddTileColumns(problem.weights.tile(0), tiles, columns, nullptr, first,
+                     problem.column_double.data(), out.data());
+      for (size_t i = 0; i < judge.size(); ++i) {
+        ASSERT_NEAR(out[i], judge[i], 2e-13);  // Double sums of at most 330.
+      }
+      EXPECT_EQ(out.back(), 5.0);
+    });
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Sizes, ApplyWeights,
                          testing::ValuesIn<Size>({{0, 5, 1},
                                                   {1, 0, 1},

@@ -1,0 +1,88 @@
+#include "core/deform/moved_columns.h"
+
+#include <algorithm>
+#include <atomic>
+#include <iterator>
+
+namespace deform {
+namespace {
+
+std::atomic<int64_t> copied_bytes = 0;  // Of all sessions.
+
+bool Reserve(int64_t bytes) {
+  if (copied_bytes.fetch_add(bytes) + bytes <= MovedColumns::kMaxBytes) {
+    return true;
+  }
+  copied_bytes.fetch_sub(bytes);
+  return false;
+}
+
+// Whether a copy of `have` is good for a step of `wanted`: it is read as a
+// whole, so most of it should be of use.
+bool Serves(std::span<const int32_t> have, std::span<const int32_t> wanted) {
+  return 2 * wanted.size() >= have.size() &&
+         std::ranges::includes(have, wanted);
+}
+
+}  // namespace
+
+bool MovedColumns::Expects(const WeightTiles& weights,
+                           std::span<const int32_t> columns) const {
+  if (columns.empty()) return false;
+  if (Serves(copied_, columns)) return true;
+  if (weights.bytes() < kWorthCopying) return false;
+  const std::vector<int32_t> recent = Recent(columns);
+  return !recent.empty() &&
+         copied_bytes +
+                 WeightTiles::BytesFor(weights.points(), std::ssize(recent)) <=
+             kMaxBytes + bytes();
+}
+
+bool MovedColumns::Follow(const WeightTiles& weights,
+                          std::span<const int32_t> columns, bool partial) {
+  fresh_ = false;
+  if (columns.empty()) return false;
+  if (!Serves(copied_, columns)) {
+    Drop();
+    std::vector<int32_t> recent = Recent(columns);
+    const int64_t bytes =
+        WeightTiles::BytesFor(weights.points(), std::ssize(recent));
+    if (partial && weights.bytes() >= kWorthCopying && bytes > 0 &&
+        Reserve(bytes)) {
+      copy_ = WeightTiles(weights.points(), std::ssize(recent));
+      copied_ = std::move(recent);
+      fresh_ = true;
+    }
+  }
+  before_last_ = std::move(last_);
+  last_.assign(columns.begin(), columns.end());
+  return partial && !copied_.empty();
+}
+
+void MovedColumns::Fill(const WeightTiles& weights, int64_t first,
+                        int64_t count) {
+  if (!fresh_) return;
+  for (int64_t t = first; t < first + count; ++t) {
+    float* to = copy_.tile(t);
+    for (const int32_t c : copied_) {
+      to = std::copy_n(weights.tile(t) + c * kTilePoints, kTilePoints, to);
+    }
+  }
+}
+
+std::vector<int32_t> MovedColumns::Recent(
+    std::span<const int32_t> columns) const {
+  if (Serves(last_, columns)) return last_;
+  std::vector<int32_t> both;
+  std::ranges::set_union(last_, before_last_, std::back_inserter(both));
+  if (!Serves(both, columns)) both.clear();
+  return both;
+}
+
+void MovedColumns::Drop() {
+  copied_bytes -= bytes();
+  copy_ = {};
+  copied_.clear();
+}
+
+}  // namespace deform

@@ -1,0 +1,61 @@
+// Copies of the weight columns that keep moving.
+//
+// While a drag lasts, the same few columns change at every step. Scattered over
+// the tiles, they come from memory four times slower than columns that lie side
+// by side. So when columns move again that moved just before, a session copies
+// them once and reads the copy from then on.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/kernels/weight_tiles.h"
+
+namespace deform {
+
+// Of one session. Not thread-safe, but for Fill() of different tiles. Columns
+// are named by their sorted indices.
+class MovedColumns {
+ public:
+  // All sessions of the process together copy no more than this; who comes too
+  // late reads the weights.
+  static constexpr int64_t kMaxBytes = int64_t{256} << 20;
+  // Weights of fewer bytes stay in the caches, where no order is slow.
+  static constexpr int64_t kWorthCopying = int64_t{4} << 20;
+
+  MovedColumns() = default;
+  ~MovedColumns() { Drop(); }
+  MovedColumns(const MovedColumns&) = delete;
+  MovedColumns& operator=(const MovedColumns&) = delete;
+
+  // Whether a step of these columns would find them copied, or copy them.
+  bool Expects(const WeightTiles& weights,
+               std::span<const int32_t> columns) const;
+
+  // Tells what columns a step changes. If it reads weights for them alone
+  // (`partial`), says whether from a copy: if so, Fill() all tiles, then add
+  // all of copied() from tile().
+  bool Follow(const WeightTiles& weights, std::span<const int32_t> columns,
+              bool partial);
+
+  // Copies tiles [first, first + count) unless an earlier step did.
+  void Fill(const WeightTiles& weights, int64_t first, int64_t count);
+
+  std::span<const int32_t> copied() const { return copied_; }
+  const float* tile(int64_t t) const { return copy_.tile(t); }
+  int64_t bytes() const { return copy_.bytes(); }
+
+ private:
+  // What to copy for these columns: those of the last step or, if two
+  // participants take turns, of the last two. Empty if they did not move then.
+  std::vector<int32_t> Recent(std::span<const int32_t> columns) const;
+  void Drop();
+
+  std::vector<int32_t> last_, before_last_;  // Of the last two steps.
+  std::vector<int32_t> copied_;
+  WeightTiles copy_;
+  bool fresh_ = false;  // Allocated in this step: to be filled.
+};
+
+}  // namespace deform

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <type_traits>
 #include <utility>
 
 #include <Eigen/Eigenvalues>
@@ -11,8 +13,9 @@ namespace deform {
 namespace {
 
 constexpr double kTargetResidual = 1e-15;
-// Above it the search goes on in long double, along other axes.
-constexpr double kWideResidual = 2e-13;
+// What the rounding of exponents may add to a residual; beyond it the search
+// goes on in long double, with the Hessian along its own axes.
+constexpr double kMaxNoise = 1e-13;
 // Below these residuals a search that has not halved its residual in so many
 // steps has met the rounding floor.
 constexpr double kDeepFloor = 1e-13;
@@ -20,7 +23,6 @@ constexpr int kDeepPatience = 1;
 constexpr double kShallowFloor = 1e-4;
 constexpr int kShallowPatience = 5;
 constexpr int kMaxSteps = 120;
-constexpr int kMaxTurns = 3;
 // In Newton steps; on the way to the hull these are too short by far.
 constexpr double kLongestStep = 64;
 // A fall of the potential by this part of its terms is no rounding.
@@ -36,15 +38,6 @@ template <class Real>
 double ExponentIn(const Directions& q, int64_t i, const Vector<Real>& y) {
   return static_cast<double>(q.x[i] * y.x() + q.y[i] * y.y() + q.z[i] * y.z());
 }
-
-// The same directions along other axes, in which the Hessian is written: next
-// to a face or an edge of the hull, and among handles that are seen in nearly
-// one direction, its condition is beyond all digits; along its own axes the
-// thin ones keep theirs.
-struct Turned {
-  Eigen::Matrix3d axes;  // Rows.
-  Directions q;
-};
 
 // Phi and its derivatives at a point y, and what else one pass can tell.
 struct Moments {
@@ -148,17 +141,63 @@ Reach ReachOf(const Directions& q, const Vector<Real>& y, const Vec3& step) {
   return reach;
 }
 
+// The directions along other axes, in which the Hessian is written: next to a
+// face or an edge of the hull, and among handles that are seen in nearly one
+// direction, its condition is beyond all digits; along its own axes the thin
+// ones keep theirs.
+class Turned {
+ public:
+  explicit Turned(const Directions& q)
+      : q_(q), along_(q), axes_(Eigen::Matrix3d::Identity()) {}
+
+  const Directions& directions() const { return along_; }
+
+  // -H^-1 g for the Hessian of `m`, which is along these axes.
+  Vec3 NewtonStep(const Moments& m) const {
+    const Vec3 along = SolveSemidefinite(HessianOf(m), axes_ * -m.gradient);
+    return axes_.transpose() * along;
+  }
+
+  // Goes on to the axes of the Hessian of `m`, which is along these. A subspace
+  // without a component keeps having none.
+  void Turn(const Moments& m) {
+    const Eigen::Matrix3d hessian = HessianOf(m) / (m.xx + m.yy + m.zz);
+    if (!hessian.allFinite()) return;
+    Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+    if (m.zz == 0) {
+      const double angle = 0.5 * std::atan2(2 * m.xy, m.xx - m.yy);
+      turn.topLeftCorner<2, 2>() << std::cos(angle), std::sin(angle),
+          -std::sin(angle), std::cos(angle);
+    } else {
+      turn = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(hessian)
+                 .eigenvectors()
+                 .transpose();
+    }
+    axes_ = turn * axes_;
+    for (int64_t i = 0; i < q_.size(); ++i) {
+      const Vec3 along = axes_ * q_.q(i);
+      along_.x[i] = along.x();
+      along_.y[i] = along.y();
+      along_.z[i] = along.z();
+    }
+  }
+
+ private:
+  const Directions& q_;
+  Directions along_;
+  Eigen::Matrix3d axes_;  // Rows.
+};
+
 template <class Potential, class Real>
 class Descent {
+  static constexpr bool kWide = !std::is_same_v<Real, double>;
+
  public:
-  // `turned` may be null.
-  Descent(const Directions& q, const Turned* turned, const Potential& potential,
+  Descent(const Directions& q, const Potential& potential,
           const Vector<Real>& start)
-      : q_(q),
-        turned_(turned),
-        potential_(potential),
-        y_(Vector<Real>::Zero()),
-        now_(At(y_)) {
+      : q_(q), potential_(potential), y_(Vector<Real>::Zero()) {
+    if constexpr (kWide) turned_.emplace(q);
+    now_ = At(y_);
     if (start.isZero(0) || !start.allFinite()) return;
     const Moments other = At(start);
     if (!(other.value < now_.value)) return;
@@ -178,10 +217,11 @@ class Descent {
         best.residual = residual;
         best.y = y_.template cast<long double>();
       }
-      if (residual <= kTargetResidual) break;
+      if (residual <= std::max(kTargetResidual, Noise())) break;
       if (now_.largest_exponent < 0) {
         return Separated(y_.template cast<double>(), best);
       }
+      if (!kWide && Noise() > kMaxNoise) break;
       // Among directions of different scales the residual may rise for long
       // while the potential falls.
       const bool falls = now_.value < fallen_to - kFall * now_.magnitude;
@@ -200,18 +240,28 @@ class Descent {
     return best;
   }
 
- private:
-  Moments At(const Vector<Real>& y) const {
-    return MomentsAt(q_, turned_ != nullptr ? turned_->q : q_, potential_, y);
+  // Where the search stands, which need not be the best place so far.
+  const Vector<Real>& y() const { return y_; }
+
+  // What the rounding of exponents adds to the residual.
+  double Noise() const {
+    return static_cast<double>(std::numeric_limits<Real>::epsilon() *
+                               y_.norm());
   }
 
-  Vec3 NewtonStep() const {
-    if (turned_ == nullptr) {
+ private:
+  Moments At(const Vector<Real>& y) const {
+    return MomentsAt(q_, kWide ? turned_->directions() : q_, potential_, y);
+  }
+
+  Vec3 NewtonStep() {
+    if constexpr (!kWide) {
       return SolveSemidefinite(HessianOf(now_), -now_.gradient);
+    } else {
+      const Vec3 step = turned_->NewtonStep(now_);
+      turned_->Turn(now_);
+      return step;
     }
-    const Vec3 along =
-        SolveSemidefinite(HessianOf(now_), turned_->axes * -now_.gradient);
-    return turned_->axes.transpose() * along;
   }
 
   static NewtonSolution Separated(const Vec3& by, NewtonSolution best) {
@@ -220,92 +270,88 @@ class Descent {
   }
 
   // Backtracks from the whole step until the potential falls enough. Where
-  // rounding hides the fall of the potential, the slope decides. Where the
-  // whole step leaves much of the slope, goes further, up to `longest`.
+  // rounding hides the fall of the potential, the slope decides, and where it
+  // hides that, too, Newton's step is trusted. Where the whole step leaves much
+  // of the slope, goes further, up to `longest`.
   bool Advance(const Vec3& step, double longest) {
     const double slope = now_.gradient.dot(step);
     double length = std::min(1.0, longest);
+    if (!(length > 0)) return false;
+    const bool hidden = -slope <= kFall * kFall * now_.magnitude;
     for (int halvings = 0; halvings < 60; ++halvings, length *= 0.5) {
       const Vector<Real> y = y_ + (length * step).template cast<Real>();
       const Moments next = At(y);
       const bool falls = next.value <= now_.value + 1e-4 * length * slope;
       const bool flattens = next.gradient.dot(step) <= 0.1 * std::abs(slope) &&
                             next.value <= now_.value + 1e-12 * now_.magnitude;
-      if (falls || flattens) {
+      if (falls || flattens || hidden) {
         const Vector<Real> from = std::exchange(y_, y);
         now_ = next;
-        if (halvings == 0) GoFurther(from, step, slope, length, longest);
+        if (halvings > 0) {
+          GoBetween(from, step, slope, length);
+          went_further_ = false;
+        } else {
+          went_further_ = !hidden && !went_further_ &&
+                          GoFurther(from, step, slope, length, longest);
+        }
         return true;
       }
     }
     return false;
   }
 
-  void GoFurther(const Vector<Real>& from, const Vec3& step, double slope,
+  // The whole `length` is good and twice that is too far: perhaps half as much
+  // again is better.
+  void GoBetween(const Vector<Real>& from, const Vec3& step, double slope,
+                 double length) {
+    if (!(now_.gradient.dot(step) < 0.1 * slope)) return;
+    const Vector<Real> y = from + (1.5 * length * step).template cast<Real>();
+    const Moments next = At(y);
+    if (!(next.value < now_.value)) return;
+    y_ = y;
+    now_ = next;
+  }
+
+  // Not twice in a row: directions in which the whole step was right are led
+  // astray by it, and need one whole step to come back.
+  bool GoFurther(const Vector<Real>& from, const Vec3& step, double slope,
                  double length, double longest) {
+    bool went = false;
     while (now_.gradient.dot(step) < 0.1 * slope && 2 * length <= longest) {
       length *= 2;
       const Vector<Real> y = from + (length * step).template cast<Real>();
       const Moments next = At(y);
-      if (!(next.value < now_.value)) return;
+      if (!(next.value < now_.value && next.gradient.dot(step) <= 0)) break;
       y_ = y;
       now_ = next;
+      went = true;
     }
+    return went;
   }
 
   const Directions& q_;
-  const Turned* const turned_;
+  std::optional<Turned> turned_;  // If wide.
   const Potential& potential_;
   Vector<Real> y_;
   Moments now_;
+  bool went_further_ = false;
 };
-
-// Along the axes of the Hessian at y. A subspace without a component keeps
-// having none.
-template <class Potential>
-Turned TurnedAt(const Directions& q, const Potential& potential,
-                const WideVec3& y) {
-  const Moments m = MomentsAt(q, q, potential, y);
-  Turned turned{Eigen::Matrix3d::Identity(), q};
-  const Eigen::Matrix3d hessian = HessianOf(m) / (m.xx + m.yy + m.zz);
-  if (!hessian.allFinite()) return turned;
-  if (m.zz == 0) {
-    const double angle = 0.5 * std::atan2(2 * m.xy, m.xx - m.yy);
-    turned.axes.topLeftCorner<2, 2>() << std::cos(angle), std::sin(angle),
-        -std::sin(angle), std::cos(angle);
-  } else {
-    turned.axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(hessian)
-                      .eigenvectors()
-                      .transpose();
-  }
-  for (int64_t i = 0; i < q.size(); ++i) {
-    const Vec3 along = turned.axes * q.q(i);
-    turned.q.x[i] = along.x();
-    turned.q.y[i] = along.y();
-    turned.q.z[i] = along.z();
-  }
-  return turned;
-}
 
 template <class Potential>
 NewtonSolution MinimizeIn(const Directions& q, const Potential& potential,
                           const WideVec3& start) {
-  NewtonSolution best =
-      Descent<Potential, double>(q, nullptr, potential, start.cast<double>())
-          .Run();
-  for (int turn = 0; turn < kMaxTurns; ++turn) {
-    if (best.separated() || best.residual <= kWideResidual) break;
-    const Turned turned = TurnedAt(q, potential, best.y);
-    NewtonSolution next =
-        Descent<Potential, long double>(q, &turned, potential, best.y).Run();
-    next.iterations += best.iterations;
-    if (!next.separated() && !(next.residual < best.residual)) {
-      best.iterations = next.iterations;
-      break;
-    }
-    best = next;
+  Descent<Potential, double> descent(q, potential, start.cast<double>());
+  const NewtonSolution narrow = descent.Run();
+  if (narrow.separated() ||
+      narrow.residual + descent.Noise() <= 2 * kMaxNoise) {
+    return narrow;
   }
-  return best;
+  NewtonSolution wide =
+      Descent<Potential, long double>(q, potential,
+                                      descent.y().template cast<long double>())
+          .Run();
+  wide.iterations += narrow.iterations;
+  return wide;
 }
 
 }  // namespace

@@ -47,8 +47,9 @@ inline double Exponent(const Directions& q, int64_t i, const WideVec3& y) {
 // start. Stops at a residual of 1e-15, or when it no longer falls; the best
 // iterate is returned, whether good enough or not. O(n) a step.
 //
-// Works in double. Where that ends above 2e-13, goes on with exponents from long
-// double and the Hessian along its own axes.
+// Works in double. Where y grows so long that rounding of the exponents shows in
+// the residual, goes on with exponents from long double and the Hessian along
+// its own axes.
 NewtonSolution Minimize(const Directions& directions,
                         const ExponentialPotential& potential,
                         const WideVec3& start);

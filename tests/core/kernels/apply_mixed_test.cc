@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include <hwy/targets.h>
 #include <cstring>
 #include <random>
@@ -26,7 +28,9 @@ class ApplyMixedColumns : public testing::TestWithParam<Size> {};
 // of the ranges of integers among them.
 struct Problem {
   explicit Problem(const Size& size)
-      : numbers(size.blocks * size.columns.block_bytes()) {
+      // At least one, so that there is a place even for none.
+      : numbers(
+            std::max<int64_t>(1, size.blocks * size.columns.block_bytes())) {
     std::mt19937 random(5);
     std::uniform_real_distribution<double> uniform(-1, 1);
     const MixedColumns& columns = size.columns;

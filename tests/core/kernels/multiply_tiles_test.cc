@@ -16,8 +16,9 @@ namespace {
 std::vector<double> RandomNumbers(int64_t count) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> uniform(-1, 1);
-  std::vector<double> numbers(count);
-  for (double& number : numbers) number = uniform(random);
+  std::vector<double> numbers;
+  numbers.reserve(count + 1);  // Not null, even if empty.
+  for (int64_t i = 0; i < count; ++i) numbers.push_back(uniform(random));
   return numbers;
 }
 

@@ -102,6 +102,39 @@ TEST(Layering, OnlyTheServersRpcRoomKnowsTheWire) {
   }
 }
 
+// Each room of the server, and the rooms of the server it may know besides
+// itself. server.cc and main.cc, which join them, know all.
+const std::map<std::string, std::vector<std::string>>& ServerArrows() {
+  static const auto& arrows =
+      *new std::map<std::string, std::vector<std::string>>{
+          {"server/stores", {}},
+          {"server/models", {"server/stores"}},
+          {"server/sessions", {"server/stores", "server/models"}},
+          {"server/rpc", {"server/stores", "server/models", "server/sessions"}},
+      };
+  return arrows;
+}
+
+TEST(Layering, ServerRoomsKnowOnlyTheRoomsBelow) {
+  int rooms = 0;
+  for (const auto& [file, target] : AllIncludes()) {
+    const auto arrows = ServerArrows().find(RoomOf(file));
+    if (arrows == ServerArrows().end() || !Within(target, "server")) continue;
+    ++rooms;
+    if (RoomOf(target) == arrows->first) continue;
+    EXPECT_THAT(arrows->second, testing::Contains(RoomOf(target)))
+        << file << " includes " << target;
+  }
+  EXPECT_GT(rooms, 50);
+}
+
+TEST(Layering, OnlyTheSqliteWrapperKnowsSqlite) {
+  for (const auto& [file, target] : AllIncludes()) {
+    if (target != "sqlite3.h") continue;
+    EXPECT_EQ(file, "server/stores/sqlite.cc");
+  }
+}
+
 TEST(Layering, ServerAndClientDoNotKnowEachOther) {
   for (const auto& [file, target] : AllIncludes()) {
     EXPECT_FALSE(Within(file, "server") && Within(target, "client"))

@@ -24,31 +24,37 @@ bool Serves(std::span<const int32_t> have, std::span<const int32_t> wanted) {
          std::ranges::includes(have, wanted);
 }
 
+// Of a copy of so many columns, with the sums beside it.
+int64_t BytesWith(const WeightTiles& weights, int64_t columns) {
+  return WeightTiles::BytesFor(weights.points(), columns + 6);
+}
+
 }  // namespace
+
+bool MovedColumns::Has(std::span<const int32_t> columns) const {
+  return !columns.empty() && Serves(copied_, columns);
+}
 
 bool MovedColumns::Expects(const WeightTiles& weights,
                            std::span<const int32_t> columns) const {
-  if (columns.empty()) return false;
-  if (Serves(copied_, columns)) return true;
-  if (weights.bytes() < kWorthCopying) return false;
-  const std::vector<int32_t> recent = Recent(columns);
-  return !recent.empty() &&
-         copied_bytes +
-                 WeightTiles::BytesFor(weights.points(), std::ssize(recent)) <=
-             kMaxBytes + bytes();
+  if (Has(columns)) return true;
+  if (columns.empty() || weights.bytes() < kWorthCopying) return false;
+  const int64_t recent = std::ssize(Recent(columns));
+  return recent > 0 &&
+         copied_bytes - reserved_ + BytesWith(weights, recent) <= kMaxBytes;
 }
 
 bool MovedColumns::Follow(const WeightTiles& weights,
                           std::span<const int32_t> columns, bool partial) {
   fresh_ = false;
   if (columns.empty()) return false;
-  if (!Serves(copied_, columns)) {
+  if (!Has(columns)) {
     Drop();
     std::vector<int32_t> recent = Recent(columns);
-    const int64_t bytes =
-        WeightTiles::BytesFor(weights.points(), std::ssize(recent));
-    if (partial && weights.bytes() >= kWorthCopying && bytes > 0 &&
+    const int64_t bytes = BytesWith(weights, std::ssize(recent));
+    if (partial && !recent.empty() && weights.bytes() >= kWorthCopying &&
         Reserve(bytes)) {
+      reserved_ = bytes;
       copy_ = WeightTiles(weights.points(), std::ssize(recent));
       copied_ = std::move(recent);
       fresh_ = true;
@@ -80,7 +86,8 @@ std::vector<int32_t> MovedColumns::Recent(
 }
 
 void MovedColumns::Drop() {
-  copied_bytes -= bytes();
+  copied_bytes -= reserved_;
+  reserved_ = 0;
   copy_ = {};
   copied_.clear();
 }

@@ -18,8 +18,8 @@ namespace deform {
 // are named by their sorted indices.
 class MovedColumns {
  public:
-  // All sessions of the process together copy no more than this; who comes too
-  // late reads the weights.
+  // What all sessions of the process together take for copies, and for the
+  // sums beside them (6 floats a point); who comes too late reads the weights.
   static constexpr int64_t kMaxBytes = int64_t{256} << 20;
   // Weights of fewer bytes stay in the caches, where no order is slow.
   static constexpr int64_t kWorthCopying = int64_t{4} << 20;
@@ -29,13 +29,15 @@ class MovedColumns {
   MovedColumns(const MovedColumns&) = delete;
   MovedColumns& operator=(const MovedColumns&) = delete;
 
+  // Whether the copy is good for a step of these columns.
+  bool Has(std::span<const int32_t> columns) const;
   // Whether a step of these columns would find them copied, or copy them.
   bool Expects(const WeightTiles& weights,
                std::span<const int32_t> columns) const;
 
   // Tells what columns a step changes. If it reads weights for them alone
-  // (`partial`), says whether from a copy: if so, Fill() all tiles, then add
-  // all of copied() from tile().
+  // (`partial`), says whether from a copy: if so, Fill() all tiles, then apply
+  // all of copied() from tile(). Without Has() the copy there was is dropped.
   bool Follow(const WeightTiles& weights, std::span<const int32_t> columns,
               bool partial);
 
@@ -55,7 +57,8 @@ class MovedColumns {
   std::vector<int32_t> last_, before_last_;  // Of the last two steps.
   std::vector<int32_t> copied_;
   WeightTiles copy_;
-  bool fresh_ = false;  // Allocated in this step: to be filled.
+  int64_t reserved_ = 0;  // Of kMaxBytes.
+  bool fresh_ = false;    // Allocated in this step: to be filled.
 };
 
 }  // namespace deform

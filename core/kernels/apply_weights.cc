@@ -45,24 +45,32 @@ constexpr int kTilesOfSets = kPairs / kSets;
 
 constexpr int64_t kPrefetchBytes = 1024;
 
-// `kTiles` tiles, `stride` tiles apart, times `kCount` of `sets` sets.
-template <int kTiles, int kCount>
+// `kTiles` tiles, `stride` tiles apart, times `kCount` of `sets` sets; begins
+// at `base`, laid out as `out`, or, if null, at 0.
+template <int kTiles, int kCount, int64_t kAhead = kPrefetchBytes>
 HWY_INLINE void Apply(const float* HWY_RESTRICT tiles, int64_t stride,
                       int64_t columns, int64_t sets,
                       const float* HWY_RESTRICT column,
-                      float* HWY_RESTRICT out) {
+                      const float* HWY_RESTRICT base, float* HWY_RESTRICT out) {
   Floats sums[kTiles][kCount][3][kVectors];
-  for (auto& tile : sums) {
-    for (auto& set : tile) {
-      for (auto& axis : set) {
-        for (Floats& sum : axis) sum = hn::Zero(kFloats);
+  for (int t = 0; t < kTiles; ++t) {
+    for (int s = 0; s < kCount; ++s) {
+      for (int d = 0; d < 3; ++d) {
+        for (int v = 0; v < kVectors; ++v) {
+          sums[t][s][d][v] =
+              base == nullptr
+                  ? hn::Zero(kFloats)
+                  : hn::LoadU(kFloats, base +
+                                           (t * stride * sets + s) * kTileSums +
+                                           d * kTilePoints + v * kLanes);
+        }
       }
     }
   }
   for (int64_t c = 0; c < columns; ++c) {
     for (int t = 0; t < kTiles; ++t) {
       const float* weights = tiles + (t * stride * columns + c) * kTilePoints;
-      hwy::Prefetch(reinterpret_cast<const char*>(weights) + kPrefetchBytes);
+      hwy::Prefetch(reinterpret_cast<const char*>(weights) + kAhead);
       for (int v = 0; v < kVectors; ++v) {
         const Floats w = hn::Load(kFloats, weights + v * kLanes);
         for (int s = 0; s < kCount; ++s) {
@@ -95,11 +103,18 @@ HWY_INLINE void ApplySets(const float* tiles, int64_t stride, int64_t columns,
                           int64_t sets, const float* column, float* out) {
   int64_t s = 0;
   for (; s + kSets <= sets; s += kSets) {
-    Apply<kTiles, kSets>(tiles, stride, columns, sets, column + s * 3,
+    Apply<kTiles, kSets>(tiles, stride, columns, sets, column + s * 3, nullptr,
                          out + s * kTileSums);
   }
+  if constexpr (kSets > 2) {
+    if (s + 2 <= sets) {
+      Apply<kTiles, 2>(tiles, stride, columns, sets, column + s * 3, nullptr,
+                       out + s * kTileSums);
+      s += 2;
+    }
+  }
   for (; s < sets; ++s) {
-    Apply<kTiles, 1>(tiles, stride, columns, sets, column + s * 3,
+    Apply<kTiles, 1>(tiles, stride, columns, sets, column + s * 3, nullptr,
                      out + s * kTileSums);
   }
 }
@@ -112,7 +127,7 @@ void ApplyTiles(const float* tiles, int64_t count, int64_t columns,
     const float* first = tiles + t * columns * kTilePoints;
     float* sums = out + t * sets * kTileSums;
     if (sets == 1) {
-      Apply<kWalks, 1>(first, stride, columns, 1, column, sums);
+      Apply<kWalks, 1>(first, stride, columns, 1, column, nullptr, sums);
     } else {
       ApplySets<kTilesOfSets>(first, stride, columns, sets, column, sums);
     }
@@ -123,91 +138,55 @@ void ApplyTiles(const float* tiles, int64_t count, int64_t columns,
   }
 }
 
-// The sums of a tile, kept in registers while columns are added.
-struct TileSums {
-  HWY_INLINE void Load(const double* from) {
-    for (int d = 0; d < 3; ++d) {
-      for (int v = 0; v < kDoubleVectors; ++v) {
-        sums[d][v] =
-            hn::LoadU(kDoubles, from + d * kTilePoints + v * kDoubleLanes);
-      }
-    }
-  }
-  HWY_INLINE void Add(const float* HWY_RESTRICT weights,
-                      const double* HWY_RESTRICT delta) {
-    const hn::Rebind<float, decltype(kDoubles)> halves;
-    for (int v = 0; v < kDoubleVectors; ++v) {
-      const Doubles w = hn::PromoteTo(
-          kDoubles, hn::LoadU(halves, weights + v * kDoubleLanes));
-      for (int d = 0; d < 3; ++d) {
-        sums[d][v] = hn::MulAdd(w, hn::Set(kDoubles, delta[d]), sums[d][v]);
-      }
-    }
-  }
-  HWY_INLINE void Store(double* to) const {
-    for (int d = 0; d < 3; ++d) {
-      for (int v = 0; v < kDoubleVectors; ++v) {
-        hn::StoreU(sums[d][v], kDoubles,
-                   to + d * kTilePoints + v * kDoubleLanes);
-      }
-    }
-  }
-
-  Doubles sums[3][kDoubleVectors];
-};
-
-constexpr int kAddWalks = 12 * kDoubleVectors < kRegisters ? 2 : 1;
-
-// The first `changed` columns, read forward, of `kTiles` tiles, `stride` tiles
-// apart.
-template <int kTiles>
-HWY_INLINE void AddFirst(const float* HWY_RESTRICT tiles, int64_t stride,
-                         int64_t columns, int64_t changed,
-                         const double* HWY_RESTRICT delta,
-                         double* HWY_RESTRICT out) {
-  TileSums sums[kTiles];
-  for (int t = 0; t < kTiles; ++t) sums[t].Load(out + t * stride * kTileSums);
-  for (int64_t c = 0; c < changed; ++c) {
-    for (int t = 0; t < kTiles; ++t) {
-      const float* weights = tiles + (t * stride * columns + c) * kTilePoints;
-      hwy::Prefetch(reinterpret_cast<const char*>(weights) +
-                    2 * kPrefetchBytes);
-      sums[t].Add(weights, delta + c * 3);
-    }
-  }
-  for (int t = 0; t < kTiles; ++t) sums[t].Store(out + t * stride * kTileSums);
-}
-
-void AddFirstColumns(const float* tiles, int64_t count, int64_t columns,
-                     int64_t changed, const double* delta, double* out) {
-  const int64_t stride = count / kAddWalks;
+void ApplyTilesBeside(const float* base, const float* tiles, int64_t count,
+                      int64_t columns, const float* column, float* out) {
+  constexpr int kTogether = kPairs < 2 ? 1 : 2;
+  // Further ahead: few columns are soon through.
+  constexpr int64_t kAhead = 2 * kPrefetchBytes;
+  const int64_t stride = count / kTogether;
   for (int64_t t = 0; t < stride; ++t) {
-    AddFirst<kAddWalks>(tiles + t * columns * kTilePoints, stride, columns,
-                        changed, delta, out + t * kTileSums);
+    Apply<kTogether, 1, kAhead>(tiles + t * columns * kTilePoints, stride,
+                                columns, 1, column, base + t * kTileSums,
+                                out + t * kTileSums);
   }
-  for (int64_t t = stride * kAddWalks; t < count; ++t) {
-    AddFirst<1>(tiles + t * columns * kTilePoints, 1, columns, changed, delta,
-                out + t * kTileSums);
+  for (int64_t t = stride * kTogether; t < count; ++t) {
+    Apply<1, 1>(tiles + t * columns * kTilePoints, 1, columns, 1, column,
+                base + t * kTileSums, out + t * kTileSums);
   }
 }
 
 void AddTileColumns(const float* tiles, int64_t count, int64_t columns,
                     const int32_t* index, int64_t changed, const double* delta,
                     double* out) {
-  if (index == nullptr) {
-    AddFirstColumns(tiles, count, columns, changed, delta, out);
-    return;
-  }
+  const hn::Rebind<float, decltype(kDoubles)> halves;
   for (int64_t t = 0; t < count; ++t, out += kTileSums) {
     const float* tile = tiles + t * columns * kTilePoints;
-    TileSums sums;
-    sums.Load(out);
-    for (int64_t k = 0; k < changed; ++k) {
-      const float* weights = tile + int64_t{index[k]} * kTilePoints;
-      if (t + 1 < count) hwy::Prefetch(weights + columns * kTilePoints);
-      sums.Add(weights, delta + k * 3);
+    Doubles sums[3][kDoubleVectors];
+    for (int d = 0; d < 3; ++d) {
+      for (int v = 0; v < kDoubleVectors; ++v) {
+        sums[d][v] =
+            hn::LoadU(kDoubles, out + d * kTilePoints + v * kDoubleLanes);
+      }
     }
-    sums.Store(out);
+    for (int64_t k = 0; k < changed; ++k) {
+      const float* weights =
+          tile + (index != nullptr ? int64_t{index[k]} : k) * kTilePoints;
+      if (t + 1 < count) hwy::Prefetch(weights + columns * kTilePoints);
+      for (int v = 0; v < kDoubleVectors; ++v) {
+        const Doubles w = hn::PromoteTo(
+            kDoubles, hn::LoadU(halves, weights + v * kDoubleLanes));
+        for (int d = 0; d < 3; ++d) {
+          sums[d][v] =
+              hn::MulAdd(w, hn::Set(kDoubles, delta[k * 3 + d]), sums[d][v]);
+        }
+      }
+    }
+    for (int d = 0; d < 3; ++d) {
+      for (int v = 0; v < kDoubleVectors; ++v) {
+        hn::StoreU(sums[d][v], kDoubles,
+                   out + d * kTilePoints + v * kDoubleLanes);
+      }
+    }
   }
 }
 
@@ -219,11 +198,18 @@ HWY_AFTER_NAMESPACE();
 namespace deform {
 
 HWY_EXPORT(ApplyTiles);
+HWY_EXPORT(ApplyTilesBeside);
 HWY_EXPORT(AddTileColumns);
 
 void ApplyTiles(const float* tiles, int64_t count, int64_t columns,
                 int64_t sets, const float* column, float* out) {
   HWY_DYNAMIC_DISPATCH(ApplyTiles)(tiles, count, columns, sets, column, out);
+}
+
+void ApplyTilesBeside(const float* base, const float* tiles, int64_t count,
+                      int64_t columns, const float* column, float* out) {
+  HWY_DYNAMIC_DISPATCH(ApplyTilesBeside)
+  (base, tiles, count, columns, column, out);
 }
 
 void AddTileColumns(const float* tiles, int64_t count, int64_t columns,

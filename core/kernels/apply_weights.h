@@ -28,15 +28,22 @@ void ApplyTiles(const float* tiles, int64_t count, int64_t columns,
 //       d]
 // Double, because these sums are kept over many steps; few columns are bound by
 // memory, not by arithmetic. `index` may be null: the first `changed` columns.
-// That is the fast way: columns that lie scattered over the tiles take four
-// times as long as those side by side, which memory serves at full speed.
+// Columns that lie scattered over the tiles take four times as long.
 void AddTileColumns(const float* tiles, int64_t count, int64_t columns,
                     const int32_t* index, int64_t changed, const double* delta,
                     double* out);
 
+// All columns of few, of one set, beside what others come to: for `count` tiles
+//   out[t * 48 + d * 16 + i] = base[t * 48 + d * 16 + i] +
+//       sum over c of tiles[(t * columns + c) * 16 + i] * column[c * 3 + d]
+void ApplyTilesBeside(const float* base, const float* tiles, int64_t count,
+                      int64_t columns, const float* column, float* out);
+
 // The judges: the same sums in double, one after the other.
 void ApplyTilesPlain(const float* tiles, int64_t count, int64_t columns,
                      int64_t sets, const double* column, double* out);
+void ApplyTilesBesidePlain(const float* base, const float* tiles, int64_t count,
+                           int64_t columns, const double* column, double* out);
 void AddTileColumnsPlain(const float* tiles, int64_t count, int64_t columns,
                          const int32_t* index, int64_t changed,
                          const double* delta, double* out);

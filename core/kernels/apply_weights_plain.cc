@@ -20,6 +20,12 @@ void ApplyTilesPlain(const float* tiles, int64_t count, int64_t columns,
   }
 }
 
+void ApplyTilesBesidePlain(const float* base, const float* tiles, int64_t count,
+                           int64_t columns, const double* column, double* out) {
+  ApplyTilesPlain(tiles, count, columns, 1, column, out);
+  for (int64_t i = 0; i < count * kTileSums; ++i) out[i] += double{base[i]};
+}
+
 void AddTileColumnsPlain(const float* tiles, int64_t count, int64_t columns,
                          const int32_t* index, int64_t changed,
                          const double* delta, double* out) {

@@ -93,8 +93,8 @@ TEST(MovedColumns, AreNotCopiedFromSmallWeights) {
 
 TEST(MovedColumns, OfAllSessionsStayWithinTheirAllowance) {
   // Never written, so none of it is real memory.
-  const WeightTiles large(8'000'000, 4);
-  const Columns columns = {0, 1, 2, 3};  // 128 MB.
+  const WeightTiles large(3'000'000, 4);
+  const Columns columns = {0, 1, 2, 3};  // 48 MB, and 72 MB beside.
   std::vector<std::unique_ptr<MovedColumns>> sessions;
   for (int k = 0; k < 3; ++k) {
     sessions.push_back(std::make_unique<MovedColumns>());

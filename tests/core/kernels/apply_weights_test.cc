@@ -107,24 +107,26 @@ TEST_P(ApplyWeights, AddsSomeColumnsAsThePlainVersionDoes) {
   });
 }
 
-TEST_P(ApplyWeights, AddsTheFirstColumnsAsThePlainVersionDoes) {
+TEST_P(ApplyWeights, AppliesFewBesideTheOthersAsThePlainVersionDoes) {
   const int64_t tiles = GetParam().tiles;
   const int64_t columns = GetParam().columns;
   const Problem problem(tiles, columns, 1);
-  for (const int64_t first : {columns, columns / 2}) {
-    std::vector<double> judge(tiles * kTileSums, 5.0);
-    AddTileColumnsPlain(problem.weights.tile(0), tiles, columns, nullptr, first,
+  const std::vector<float> base(tiles * kTileSums, 5.0f);
+  std::vector<double> judge(tiles * kTileSums);
+  ApplyTilesBesidePlain(base.data(), problem.weights.tile(0), tiles, columns,
                         problem.column_double.data(), judge.data());
-    ForEachInstructionSet([&] {
-      std::vector<double> out(judge.size() + 1, 5.0);
-      AddTileColumns(problem.weights.tile(0), tiles, columns, nullptr, first,
-                     problem.column_double.data(), out.data());
-      for (size_t i = 0; i < judge.size(); ++i) {
-        ASSERT_NEAR(out[i], judge[i], 2e-13);  // Double sums of at most 330.
-      }
-      EXPECT_EQ(out.back(), 5.0);
-    });
-  }
+  ForEachInstructionSet([&] {
+    std::vector<float> out(judge.size() + 2, 9.0f);
+    ApplyTilesBeside(base.data(), problem.weights.tile(0), tiles, columns,
+                     problem.column.data(), out.data() + 1);
+    for (size_t i = 0; i < judge.size(); ++i) {
+      // Float sums: one rounding a column, of sums that begin at 5.
+      ASSERT_NEAR(out[i + 1], judge[i],
+                  3e-7 + 3e-7 * static_cast<double>(columns));
+    }
+    EXPECT_EQ(out.front(), 9.0f);
+    EXPECT_EQ(out.back(), 9.0f);
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, ApplyWeights,

@@ -68,6 +68,14 @@ Positions OrganPoints(int64_t count) {
   return points;
 }
 
+Handles HandlesAround(int64_t count) {
+  Positions around = OrganPoints(count);
+  for (int64_t i = 0; i < count; ++i) {
+    around.row(i) = 2 * around.row(i).normalized();
+  }
+  return Handles::Create(3, around).value();
+}
+
 Cage LeafCage(int corners) {
   std::vector<Eigen::Vector2d> loop;
   for (int k = 0; k < corners; ++k) {

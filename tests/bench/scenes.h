@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "core/mesh/cage.h"
+#include "core/mesh/handles.h"
 #include "core/mesh/types.h"
 
 namespace deform::bench {
@@ -15,6 +16,9 @@ Cage OrganCage(int rings, int segments);
 // `count` points on spirals over a surface like that of OrganCage, at 0.8 of
 // its size: neighbours in space are close in order, as in most meshes.
 Positions OrganPoints(int64_t count);
+
+// Handles spread evenly around the organ.
+Handles HandlesAround(int64_t count);
 
 // A closed loop of `corners` around the origin, dented likewise, and `count`
 // points in rows within it.

@@ -110,10 +110,19 @@ void PoseJournal::Run() {
     const absl::Status status =
         entries.empty() ? absl::OkStatus() : commit_(entries);
     Settle(entries, status, batch);
-    for (const Item& item : batch) {
-      if (!item.done) continue;
-      const bool alone = status.ok() && item.session != 0;
-      item.done(alone ? entries[item.entry].status : status);
+    Tell(batch, entries, status);
+  }
+}
+
+void PoseJournal::Tell(const Batch& batch, const std::vector<Entry>& entries,
+                       const absl::Status& status) {
+  if (!status.ok()) failure_ = status;
+  for (const Item& item : batch) {
+    if (!item.done) continue;
+    if (item.session == 0) {
+      item.done(std::exchange(failure_, absl::OkStatus()));
+    } else {
+      item.done(status.ok() ? entries[item.entry].status : status);
     }
   }
 }

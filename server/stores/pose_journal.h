@@ -60,10 +60,13 @@ class PoseJournal {
   // What fails with the batch is put behind it.
   void Settle(const std::vector<Entry>& entries, const absl::Status& status,
               Batch& batch);
+  void Tell(const Batch& batch, const std::vector<Entry>& entries,
+            const absl::Status& status);
   void FailWhatWaits(Batch& batch) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const int64_t max_waiting_bytes_;
   const Commit commit_;
+  absl::Status failure_;  // Since the last barrier; of the thread alone.
   Mutex mutex_;
   CondVar changed_;
   std::map<StoreKey, PoseHead> heads_ ABSL_GUARDED_BY(mutex_);

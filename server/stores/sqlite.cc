@@ -12,13 +12,27 @@
 namespace deform::server {
 namespace {
 
+// What the system said. SQLite keeps it for some calls only; of the others the
+// last error of the VFS is the one that made them fail.
+int SystemError(sqlite3* database) {
+  const int kept = sqlite3_system_errno(database);
+  if (kept != 0) return kept;
+  sqlite3_vfs* vfs = nullptr;
+  sqlite3_file_control(database, "main", SQLITE_FCNTL_VFS_POINTER, &vfs);
+  if (vfs == nullptr || vfs->xGetLastError == nullptr) return 0;
+  return vfs->xGetLastError(vfs, 0, nullptr);
+}
+
 absl::Status SqliteError(sqlite3* database, int result) {
   absl::StatusCode code = absl::StatusCode::kUnavailable;
   std::string reason = "STORE_FAILED";
   const int primary = result & 0xff;
-  const int system = sqlite3_system_errno(database);
+  const int system = primary == SQLITE_IOERR || primary == SQLITE_CANTOPEN
+                         ? SystemError(database)
+                         : 0;
   if (primary == SQLITE_FULL ||
-      (primary == SQLITE_IOERR && (system == ENOSPC || system == EDQUOT))) {
+      ((primary == SQLITE_IOERR || primary == SQLITE_CANTOPEN) &&
+       (system == ENOSPC || system == EDQUOT))) {
     code = absl::StatusCode::kResourceExhausted;
     reason = "DISK_FULL";
   } else if (primary == SQLITE_CORRUPT || primary == SQLITE_NOTADB ||

@@ -61,7 +61,8 @@ class Store {
   // NotFound MODEL_NOT_FOUND.
   virtual absl::Status PutBinding(const StoredBinding& binding) = 0;
   // Replaces the weights that are kept. Weights can be computed again, so a
-  // store may keep none. NotFound BINDING_NOT_FOUND.
+  // store may keep none; any that were put under one form will do, so that an
+  // error may leave either. NotFound BINDING_NOT_FOUND.
   virtual absl::Status PutWeights(const StoreKey& binding,
                                   const WeightsForm& form,
                                   const StoredArrays& arrays) = 0;
@@ -77,7 +78,8 @@ class Store {
   // The durable revision. NotFound SESSION_NOT_FOUND.
   virtual absl::StatusOr<SessionPose> LoadSession(const StoreKey& session) = 0;
   // Raises the epoch and returns it: appends of the epochs before are refused
-  // from now on, those that wait included. NotFound SESSION_NOT_FOUND.
+  // from now on, those that wait included, and the first of the new one is
+  // whole. NotFound SESSION_NOT_FOUND.
   virtual absl::StatusOr<uint64_t> TakeOver(const StoreKey& session) = 0;
   // NotFound SESSION_NOT_FOUND.
   virtual absl::Status DeleteSession(const StoreKey& session) = 0;
@@ -95,8 +97,8 @@ class Store {
   virtual absl::Status Append(PoseAppend append, Done done) = 0;
   // Of the session; 0 if there is none.
   virtual uint64_t DurableRevision(const StoreKey& session) = 0;
-  // Waits until all that was appended before is durable, or has failed: then
-  // how.
+  // Waits until all that was appended before is durable or has failed. Returns
+  // how the disk failed since the last Sync(), if it did.
   virtual absl::Status Sync() = 0;
 
   // Removes files that nothing refers to, such as those that a crash left;

@@ -57,7 +57,7 @@ absl::Status Refused(absl::string_view reason, absl::string_view message) {
 }
 
 absl::Status CheckStructure(Database& database) {
-  Statement check = database.Prepare("PRAGMA quick_check(1)");
+  Statement check = database.Prepare("PRAGMA integrity_check(1)");
   DEFORM_ASSIGN_OR_RETURN(const bool row, check.Step());
   const std::string verdict = row ? check.Text(0) : "no answer";
   if (verdict == "ok") return absl::OkStatus();

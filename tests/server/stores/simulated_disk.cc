@@ -3,7 +3,9 @@
 #include <sqlite3.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 
 #include "absl/strings/match.h"
@@ -36,6 +38,11 @@ void SimulatedDisk::Inject(const Fault& fault) {
   MutexLock lock(mutex_);
   fault_ = fault;
   fault_->at += calls_;
+}
+
+void SimulatedDisk::LieAboutSyncsOf(Lie lie) {
+  MutexLock lock(mutex_);
+  lie_ = lie;
 }
 
 bool SimulatedDisk::Struck() const {
@@ -217,6 +224,7 @@ int SimulatedDisk::Sync(int file) {
   const auto node = Find(file);
   if (node == nullptr) return -EBADF;
   if (striking_ && striking_->kind == Fault::Kind::kTorn) return -EIO;
+  if (lie_ == Lie::kFiles) return 0;
   node->durable = node->now;
   node->pending.clear();
   return 0;
@@ -322,6 +330,7 @@ int SimulatedDisk::SyncDirectory(const std::string& directory) {
   MutexLock lock(mutex_);
   if (const int error = Enter()) return error;
   if (!names_.contains(directory)) return -ENOENT;
+  if (lie_ == Lie::kNames) return 0;
   std::erase_if(pending_, [&](const NameChange& change) {
     const bool synced =
         (!change.gone.empty() && FolderOf(change.gone) == directory) ||

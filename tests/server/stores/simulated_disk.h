@@ -49,6 +49,10 @@ class SimulatedDisk : public FileSystem {
   // Power comes back after a loss; what is left depends on `seed`.
   void Restart(uint64_t seed);
 
+  // From now on it says that it synced these, and does not.
+  enum class Lie { kNone, kFiles, kNames };
+  void LieAboutSyncsOf(Lie lie);
+
   // For StoreOptions::sqlite_vfs.
   const char* vfs() const { return vfs_name_.c_str(); }
   // Without faults, for tests that look and damage.
@@ -117,6 +121,7 @@ class SimulatedDisk : public FileSystem {
   // Set for the one call that a short or torn fault strikes.
   std::optional<Fault> striking_ ABSL_GUARDED_BY(mutex_);
   bool powered_ ABSL_GUARDED_BY(mutex_) = true;
+  Lie lie_ ABSL_GUARDED_BY(mutex_) = Lie::kNone;
 };
 
 // A VFS that keeps its files on `disk`, to be registered under `name`.

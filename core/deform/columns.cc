@@ -20,7 +20,10 @@ Vec3 Right(const Vec3& t) { return {t.y(), -t.x(), 0}; }
 
 // `v` divided by its length, or zero.
 Vec3 Unit(const Vec3& v) {
-  const double length = v.stableNorm();
+  // Squares of very long and very short ones leave the range of double.
+  const double square = v.squaredNorm();
+  const double length =
+      square > 1e-200 && square < 1e200 ? std::sqrt(square) : v.stableNorm();
   return length > 0 ? Vec3(v / length) : Vec3(Vec3::Zero());
 }
 

@@ -42,10 +42,11 @@ Deformer::Change Deformer::Begin(const Pose& pose, Path path) {
   pose_ = pose;
   change.full = path == Path::kFull || PrefersFull(change.columns, next);
   if (change.full) {
-    posed_columns_.UpdateAll(pose, columns_);
+    columns_ = std::move(next);
     map_ = FitSimilarity(RestVertices(binding_->rig()), pose_.vertices,
                          binding_->dimension());
     steps_since_full_ = 0;
+    change.values.reserve(3 * columns_.rows());
     for (int64_t c = 0; c < columns_.rows(); ++c) {
       const Vec3 residual = Residual(columns_, c);
       change.values.insert(change.values.end(), residual.begin(),

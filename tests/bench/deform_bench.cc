@@ -1,4 +1,6 @@
+#include <chrono>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -182,7 +184,13 @@ class DeformContest {
       const auto drag =
           std::make_shared<Drag>(binding_, percent / 100.0, kind.kind);
       const auto all = static_cast<double>(binding_->column_count());
-      if (!drag->possible() || drag->columns() > 0.4 * all) continue;
+      double& last = delta_columns_[kind.kind];
+      // Not the same once more under another name, where vertices are few.
+      if (!drag->possible() || drag->columns() > 0.4 * all ||
+          drag->columns() == last) {
+        continue;
+      }
+      last = drag->columns();
       Add(
           {.name = absl::StrCat("this, delta ", percent, " %, ", kind.name,
                                 " (", drag->columns(), " columns), 1 core"),
@@ -316,6 +324,7 @@ class DeformContest {
   const int repeats_;
   std::shared_ptr<const Binding> binding_;
   int turn_ = 0;
+  std::map<Drag::Kind, double> delta_columns_;  // Of the last.
   std::vector<std::shared_ptr<Deformer>> sessions_;
   std::vector<float> floats_, column_;
   std::vector<double> doubles_;

@@ -4,7 +4,7 @@
 //
 //   weights_bench [points] [--every-instruction-set]
 //
-// CPU time of one core, the best of three passes.
+// CPU time of one core, the best of several passes in turns.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>

@@ -18,7 +18,8 @@
 namespace deform::bench {
 namespace {
 
-constexpr int kPasses = 3;
+constexpr int kRounds = 4;
+constexpr int kPasses = 2;  // In a round.
 constexpr int64_t kAlgorithm2Points = 100;
 
 // All points of a scene, in blocks as Bind() cuts them.
@@ -137,13 +138,23 @@ class Measurement {
 
 std::vector<WeightsResult> MeasureWeights(const WeightsScene& scene) {
   const Measurement measurement(scene);
-  std::vector<WeightsResult> results = {
-      measurement.Plain(), measurement.InDouble(), measurement.InFloat(),
-      measurement.Whole()};
-  if (scene.scheme == "green" && scene.cage.dimension() == 3) {
-    results.push_back(measurement.Algorithm2());
+  std::vector<WeightsResult> best;
+  // In turns: what else the machine does hits all alike.
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<WeightsResult> results = {
+        measurement.Plain(), measurement.InDouble(), measurement.InFloat(),
+        measurement.Whole()};
+    if (scene.scheme == "green" && scene.cage.dimension() == 3) {
+      results.push_back(measurement.Algorithm2());
+    }
+    if (best.empty()) best = results;
+    for (size_t i = 0; i < best.size(); ++i) {
+      best[i].seconds_per_point_and_face =
+          std::min(best[i].seconds_per_point_and_face,
+                   results[i].seconds_per_point_and_face);
+    }
   }
-  return results;
+  return best;
 }
 
 std::vector<WeightsScene> WeightsScenes(int64_t points) {

@@ -32,8 +32,8 @@ using NearDoubles = hn::CappedTag<
 using HalfFloats = hn::Rebind<float, NearDoubles>;
 
 // An edge l is far if it is shorter than this times the sum of its ends'
-// distances r: from its middle l * 0.67 away.
-constexpr float kFar = 0.6f;
+// distances r: from its middle l * 0.44 away.
+constexpr float kFar = 0.75f;
 // If more than one face in so many is near, all might as well be in double.
 constexpr int64_t kMostlyNear = 4;
 // Beyond so many diagonals of the cage, squares and cubes leave float.

@@ -366,6 +366,9 @@ void Binder::Warn() {
                                    " on, are fixed: no pose moves "
                                    "them"));
     }
+    if (request_.options.lambda != 0) {
+      warnings.push_back("lambda is inert: it cancels out of the weights");
+    }
   }
   for (const ExitPart& part : parts_.exit_parts) {
     if (part.crossed_faces.empty()) continue;

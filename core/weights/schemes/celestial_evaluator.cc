@@ -76,6 +76,68 @@ class Starts {
   bool trusted_ = true;
 };
 
+// Points that are solved at once, one a lane.
+class LaneGroup {
+ public:
+  using Columns = Eigen::Matrix<double, Eigen::Dynamic, 3>;
+
+  // Borrows the handles and their user weights, which S-CC does not read.
+  LaneGroup(CelestialKind kind, const Columns& handles,
+            const std::vector<double>& s)
+      : scratch_(8 * lanes_ * handles.rows()),
+        weights_(lanes_ * handles.rows()),
+        solution_(3 * lanes_),
+        residual_(lanes_),
+        points_(3 * lanes_),
+        job_{.handles = handles.rows(),
+             .x = handles.col(0).data(),
+             .y = handles.col(1).data(),
+             .z = handles.col(2).data(),
+             .s = kind == CelestialKind::kScaling ? nullptr : s.data(),
+             .points = points_.get(),
+             .scratch = scratch_.get(),
+             .weights = weights_.get(),
+             .solution = solution_.get(),
+             .residual = residual_.get()} {}
+
+  int lanes() const { return lanes_; }
+
+  void Put(int lane, const Vec3& point, const Vec3& start) {
+    for (int d = 0; d < 3; ++d) {
+      points_[d * lanes_ + lane] = point[d];
+      solution_[d * lanes_ + lane] = start[d];
+    }
+  }
+
+  void Solve() { SolveCelestialLanes(job_); }
+
+  // After Solve(), of a lane:
+  bool solved(int lane) const { return (job_.solved >> lane & 1) != 0; }
+  Vec3 solution(int lane) const {
+    return {solution_[lane], solution_[lanes_ + lane],
+            solution_[2 * lanes_ + lane]};
+  }
+  // Writes what was found for a solved lane as point i.
+  void Take(int lane, int64_t i, WeightBlock& block) const {
+    double* const row = block.vertex.row(i).data();
+    for (int64_t k = 0; k < job_.handles; ++k) {
+      row[k] = weights_[k * lanes_ + lane];
+    }
+    block.iterations[i] = static_cast<uint16_t>(job_.steps);
+    block.residuals[i] = residual_[lane];
+    block.solutions.row(i) = solution(lane).cast<float>().transpose();
+  }
+
+ private:
+  const int lanes_ = CelestialLanes();
+  const AlignedArray<double> scratch_;
+  const AlignedArray<double> weights_;
+  const AlignedArray<double> solution_;
+  const AlignedArray<double> residual_;
+  const AlignedArray<double> points_;
+  CelestialLaneJob job_;
+};
+
 class CelestialEvaluator final : public WeightEvaluator {
  public:
   CelestialEvaluator(CelestialKind kind, const Handles& handles,
@@ -114,64 +176,34 @@ class CelestialEvaluator final : public WeightEvaluator {
  private:
   void EvaluateLanes(const PositionsRef& points, std::span<const int32_t> order,
                      WeightBlock& block) const {
-    const int64_t handles = handles_.rows();
-    const int lanes = CelestialLanes();
-    const AlignedArray<double> scratch(8 * lanes * handles);
-    const AlignedArray<double> weights(lanes * handles);
-    const AlignedArray<double> solution(3 * lanes);
-    const AlignedArray<double> residual(lanes);
-    const AlignedArray<double> places(3 * lanes);
-    CelestialLaneJob job = {
-        .handles = handles,
-        .x = columns_.col(0).data(),
-        .y = columns_.col(1).data(),
-        .z = columns_.col(2).data(),
-        .s = kind_ == CelestialKind::kScaling ? nullptr : s_.data(),
-        .points = places.get(),
-        .scratch = scratch.get(),
-        .weights = weights.get(),
-        .solution = solution.get(),
-        .residual = residual.get()};
+    LaneGroup group(kind_, columns_, s_);
     Directions directions;
-    directions.Resize(handles);
+    directions.Resize(handles_.rows());
     Starts starts(block.known);
     Starts hard(block.known);  // Of plain searches.
     const auto n = std::ssize(order);
-    for (int64_t first = 0; first < n; first += lanes) {
-      for (int lane = 0; lane < lanes; ++lane) {
-        // The last point fills what is left of its group.
-        const int32_t i = order[std::min(first + lane, n - 1)];
-        const Vec3 start = starts.For(i);
-        for (int d = 0; d < 3; ++d) {
-          places[d * lanes + lane] = points(i, d);
-          solution[d * lanes + lane] = start[d];
-        }
+    for (int64_t first = 0; first < n; first += group.lanes()) {
+      // The last point fills what is left of its group.
+      const auto point_of = [&](int lane) {
+        return order[std::min(first + lane, n - 1)];
+      };
+      for (int lane = 0; lane < group.lanes(); ++lane) {
+        const int32_t i = point_of(lane);
+        group.Put(lane, points.row(i), starts.For(i));
       }
-      SolveCelestialLanes(job);
-      for (int lane = 0; lane < std::min<int64_t>(lanes, n - first); ++lane) {
-        const int32_t i = order[first + lane];
-        if (job.solved >> lane & 1) {
-          double* row = block.vertex.row(i).data();
-          for (int64_t k = 0; k < handles; ++k) {
-            row[k] = weights[k * lanes + lane];
-          }
-          block.iterations[i] = static_cast<uint16_t>(job.steps);
-          block.residuals[i] = residual[lane];
-          for (int d = 0; d < 3; ++d) {
-            block.solutions(i, d) =
-                static_cast<float>(solution[d * lanes + lane]);
-          }
-          continue;
+      group.Solve();
+      for (int lane = 0; lane < group.lanes() && first + lane < n; ++lane) {
+        const int32_t i = point_of(lane);
+        if (group.solved(lane)) {
+          group.Take(lane, i, block);
+        } else {
+          EvaluatePoint(i, points.row(i), hard, directions, block);
         }
-        EvaluatePoint(i, points.row(i), hard, directions, block);
       }
       // All of the next group start from the point just before them.
-      const int last = lanes - 1;
-      Vec3 y = Vec3::Zero();
-      for (int d = 0; d < 3 && (job.solved >> last & 1) != 0; ++d) {
-        y[d] = solution[d * lanes + last];
-      }
-      starts.Learn(order[std::min(first + last, n - 1)], y);
+      const int last = group.lanes() - 1;
+      starts.Learn(point_of(last), group.solved(last) ? group.solution(last)
+                                                      : Vec3(Vec3::Zero()));
     }
   }
 
@@ -224,7 +256,7 @@ class CelestialEvaluator final : public WeightEvaluator {
   CelestialKind kind_;
   CelestialWay way_;
   Positions handles_;
-  Eigen::Matrix<double, Eigen::Dynamic, 3> columns_;  // The same by columns.
+  LaneGroup::Columns columns_;  // The same by columns.
   std::vector<double> s_;
   double largest_coordinate_;
 };

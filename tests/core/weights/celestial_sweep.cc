@@ -10,6 +10,7 @@
 #include "core/base/mutex.h"
 #include "core/mesh/mesh.h"
 #include "core/weights/scheme.h"
+#include "tests/core/weights/hull_planes.h"
 
 namespace deform {
 namespace {
@@ -34,49 +35,6 @@ Eigen::Matrix3d Rotation(Random& random) {
   const Eigen::Quaterniond q(Uniform(random, -1, 1), Uniform(random, -1, 1),
                              Uniform(random, -1, 1), Uniform(random, -1, 1));
   return q.normalized().toRotationMatrix();
-}
-
-// The planes of the hull's faces: inward . x >= offset for all handles. Found
-// by trying all triples; planes within rounding of a handle are all kept.
-struct Plane {
-  Vec3 inward;
-  double offset;
-  int64_t corner[3];
-};
-
-std::vector<Plane> HullOf(const Positions& handles) {
-  std::vector<Plane> hull;
-  const int64_t n = handles.rows();
-  const double slack = 1e-13 * BoxOf(handles).diagonal();
-  for (int64_t a = 0; a < n; ++a) {
-    for (int64_t b = a + 1; b < n; ++b) {
-      const Vec3 ab = (handles.row(b) - handles.row(a)).transpose();
-      for (int64_t c = b + 1; c < n; ++c) {
-        Vec3 normal =
-            ab.cross((handles.row(c) - handles.row(a)).transpose().head<3>());
-        if (!(normal.norm() > 0)) continue;
-        normal.normalize();
-        double least = 0, most = 0;
-        for (int64_t i = 0; i < n && (least >= -slack || most <= slack); ++i) {
-          const double side = (handles.row(i) - handles.row(a)).dot(normal);
-          least = std::min(least, side);
-          most = std::max(most, side);
-        }
-        if (least < -slack && most > slack) continue;
-        if (most <= slack) normal = -normal;
-        hull.push_back({normal, handles.row(a).dot(normal), {a, b, c}});
-      }
-    }
-  }
-  return hull;
-}
-
-double DistanceTo(const std::vector<Plane>& hull, const Vec3& point) {
-  double distance = std::numeric_limits<double>::infinity();
-  for (const Plane& plane : hull) {
-    distance = std::min(distance, plane.inward.dot(point) - plane.offset);
-  }
-  return distance;
 }
 
 // A place in the simplex of some corners, uniformly.
@@ -154,7 +112,8 @@ constexpr Configuration kConfigurations[] = {
 
 // Strictly inside: in the simplex of four handles, or a step from a face of the
 // hull towards the middle.
-Positions PointsAmong(const Positions& handles, const std::vector<Plane>& hull,
+Positions PointsAmong(const Positions& handles,
+                      const std::vector<HullPlane>& hull,
                       const Configuration& configuration, int64_t count,
                       Random& random) {
   const double diagonal = BoxOf(handles).diagonal();
@@ -162,16 +121,20 @@ Positions PointsAmong(const Positions& handles, const std::vector<Plane>& hull,
   Positions points(count, 3);
   for (int64_t i = 0; i < count; ++i) {
     Positions corners(4, 3);
+    int64_t chosen[4];
     for (int k = 0; k < 4; ++k) {
-      corners.row(k) = handles.row(Below(random, handles.rows()));
+      do {
+        chosen[k] = Below(random, handles.rows());
+      } while (std::find(chosen, chosen + k, chosen[k]) != chosen + k);
+      corners.row(k) = handles.row(chosen[k]);
     }
     points.row(i) = Within(corners, random).transpose();
     if (!configuration.near_hull) continue;
-    const Plane& face = hull[Below(random, std::ssize(hull))];
+    const HullPlane& face = hull[Below(random, std::ssize(hull))];
     for (int k = 0; k < 3; ++k) corners.row(k) = handles.row(face.corner[k]);
     const Vec3 on_face = Within(corners.topRows(3), random);
     const double depth = std::pow(10, Uniform(random, -6, -1)) * diagonal;
-    const double whole = face.inward.dot(middle) - face.offset;
+    const double whole = DepthInHull(handles, {face}, middle);
     points.row(i) =
         (on_face + std::min(0.9, depth / whole) * (middle - on_face))
             .transpose();
@@ -200,36 +163,47 @@ constexpr Case kCases[] = {{"S-CC", "s_cc", false},
                            {"T-CC", "t_cc", false},
                            {"T-CC s > 0", "t_cc", true}};
 
+// Not further inside than this, whether a point is inside or on the hull is for
+// rounding to say.
+constexpr double kRounding = 1e-15;
+
+// Inside by no more than this a point may be taken for one on the hull.
+constexpr double kHullDepth = 1e-13;
+
+// Adds the residual of a bound point to those of its distance to the hull.
+void AddResidual(double depth, double residual, int steps, SweepRow& row) {
+  if (depth >= 1e-6) {
+    row.steps_max = std::max(row.steps_max, steps);
+  } else {
+    ++row.in_skin;
+  }
+  double& worst = depth >= 1e-3   ? row.residual_far
+                  : depth >= 1e-6 ? row.residual_near
+                                  : row.residual_skin;
+  worst = std::max(worst, residual);
+}
+
 void Count(const Positions& handles, const Positions& points,
-           const std::vector<double>& distances, bool weighted,
+           const std::vector<double>& depths, bool weighted,
            const WeightBlock& block, SweepRow& row) {
   for (int64_t i = 0; i < points.rows(); ++i) {
-    // Closer than rounding, in or out is a matter of luck.
-    if (!(distances[i] > 1e-13)) continue;
+    if (!(depths[i] > kRounding)) continue;
     ++row.points;
     row.steps += block.iterations[i];
-    // The planes of faces within a cluster are known to some 1e-10 only. On the
-    // hull T-CC with user weights has no solution and says so.
-    const bool on_hull =
-        distances[i] < 1e-8 &&
-        (block.states[i] == PointState::kBoundary ||
-         (weighted && block.states[i] == PointState::kOutsideHull));
-    if (block.states[i] != PointState::kInside && !on_hull) {
+    const PointState state = block.states[i];
+    // On the hull T-CC with user weights has no solution and says so.
+    const bool refused = weighted && state == PointState::kOutsideHull;
+    if (state == PointState::kBoundary || refused) {
+      ++row.on_hull;
+      row.on_hull_depth = std::max(row.on_hull_depth, depths[i]);
+    } else if (state != PointState::kInside) {
       ++row.failures;
       continue;
     }
-    if (block.states[i] == PointState::kOutsideHull) continue;
-    const double residual =
-        ResidualOf(handles, points.row(i), block.vertex.row(i));
-    if (distances[i] >= 1e-6) {
-      row.steps_max = std::max<int>(row.steps_max, block.iterations[i]);
-    } else {
-      ++row.in_skin;
-    }
-    double& worst = distances[i] >= 1e-3   ? row.residual_far
-                    : distances[i] >= 1e-6 ? row.residual_near
-                                           : row.residual_skin;
-    worst = std::max(worst, residual);
+    if (refused) continue;
+    AddResidual(depths[i],
+                ResidualOf(handles, points.row(i), block.vertex.row(i)),
+                block.iterations[i], row);
   }
 }
 
@@ -242,6 +216,8 @@ void Merge(const SweepRow& from, SweepRow& to) {
   to.residual_near = std::max(to.residual_near, from.residual_near);
   to.residual_skin = std::max(to.residual_skin, from.residual_skin);
   to.in_skin += from.in_skin;
+  to.on_hull += from.on_hull;
+  to.on_hull_depth = std::max(to.on_hull_depth, from.on_hull_depth);
 }
 
 // User weights of all sizes, and none for some.
@@ -263,13 +239,14 @@ void SweepSet(const Configuration& configuration, uint64_t seed, int64_t count,
   Random random(seed);
   const Positions handles = configuration.handles(random);
   const auto rig = Handles::Create(3, handles);
-  const std::vector<Plane> hull = HullOf(handles);
+  const std::vector<HullPlane> hull = HullPlanesOf(handles);
   if (!rig.ok() || hull.empty()) return;
   const Positions points =
       PointsAmong(handles, hull, configuration, count, random);
-  std::vector<double> distances;
+  std::vector<double> depths;
   for (int64_t i = 0; i < count; ++i) {
-    distances.push_back(DistanceTo(hull, points.row(i)) / rig->diagonal());
+    depths.push_back(DepthInHull(handles, hull, points.row(i)) /
+                     rig->diagonal());
   }
   for (size_t k = 0; k < std::size(kCases); ++k) {
     SchemeOptions options;
@@ -280,7 +257,7 @@ void SweepSet(const Configuration& configuration, uint64_t seed, int64_t count,
         (*FindScheme(kCases[k].scheme))->Prepare(Rig(*rig), options).value();
     WeightBlock block;
     evaluator->Evaluate(points, block);
-    Count(handles, points, distances, kCases[k].weighted, block, rows[k]);
+    Count(handles, points, depths, kCases[k].weighted, block, rows[k]);
   }
 }
 
@@ -319,6 +296,10 @@ std::string BrokenPromise(const SweepRow& row) {
   const bool weighted = row.scheme == "T-CC s > 0";
   if (row.points == 0) return "no points";
   if (row.failures > 0) return absl::StrFormat("%d failures", row.failures);
+  if (!(row.on_hull_depth <= kHullDepth)) {
+    return absl::StrFormat("taken for on the hull at %.1e D inside",
+                           row.on_hull_depth);
+  }
   if (!(row.residual_far <= 1e-12)) {
     return absl::StrFormat("residual %.1e", row.residual_far);
   }

@@ -23,6 +23,8 @@ struct SweepRow {
   double residual_near = 0;  // from 1e-6 to 1e-3,
   double residual_skin = 0;  // and nearer.
   int64_t in_skin = 0;       // Points that are nearer.
+  int64_t on_hull = 0;       // Points taken for points on the hull, which is
+  double on_hull_depth = 0;  // so far from the one furthest inside.
 };
 
 // About `points` points for each of the configurations random, clustered, skew,

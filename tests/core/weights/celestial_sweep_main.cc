@@ -18,21 +18,24 @@ int main(int argc, char** argv) {
   const auto rows = deform::SweepCelestial(points, &pool);
   std::cout
       << "Residuals by distance to the hull, in diagonals of the handles' "
-         "box.\n";
-  std::cout << absl::StrFormat("%-11s %-11s %8s %8s %6s %5s %9s %9s %9s %8s\n",
-                               "handles", "scheme", "points", "failures",
-                               "steps", "most", ">= 1e-3", ">= 1e-6", "nearer",
-                               "(points)");
+         "box.\nOn hull are points taken for ones on the hull; depth is how "
+         "far inside the\nfurthest of them lies, found from the hull's planes "
+         "in more digits.\n";
+  std::cout << absl::StrFormat(
+      "%-11s %-11s %8s %8s %6s %5s %9s %9s %9s %8s %8s %8s\n", "handles",
+      "scheme", "points", "failures", "steps", "most", ">= 1e-3", ">= 1e-6",
+      "nearer", "(points)", "on hull", "depth");
   int broken = 0;
   for (const deform::SweepRow& row : rows) {
     const std::string promise = deform::BrokenPromise(row);
     broken += !promise.empty();
     std::cout << absl::StrFormat(
-        "%-11s %-11s %8d %8d %6.2f %5d %9.1e %9.1e %9.1e %8d%s\n",
+        "%-11s %-11s %8d %8d %6.2f %5d %9.1e %9.1e %9.1e %8d %8d %8.1e%s\n",
         row.configuration, row.scheme, row.points, row.failures,
         static_cast<double>(row.steps) / static_cast<double>(row.points),
         row.steps_max, row.residual_far, row.residual_near, row.residual_skin,
-        row.in_skin, promise.empty() ? "" : "  BROKEN: " + promise);
+        row.in_skin, row.on_hull, row.on_hull_depth,
+        promise.empty() ? "" : "  BROKEN: " + promise);
   }
   const std::chrono::duration<double> took =
       std::chrono::steady_clock::now() - begin;

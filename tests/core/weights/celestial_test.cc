@@ -1,116 +1,24 @@
 // Both celestial schemes, T-CC with and without user weights and S-CC, by what
 // they promise for any handles.
-#include <algorithm>
-#include <cmath>
-#include <memory>
-#include <random>
-#include <string>
-#include <vector>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <string>
+
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include "core/base/error.h"
-#include "core/mesh/handles.h"
-#include "core/weights/scheme.h"
 #include "core/weights/schemes/celestial_newton.h"
-#include "tests/support/shapes.h"
+#include "tests/core/weights/celestial_cases.h"
 
 namespace deform {
 namespace {
 
 using testing::Each;
 using testing::HasSubstr;
-
-Handles HandlesOf(const Positions& positions, int dimension = 3) {
-  return Handles::Create(dimension, positions).value();
-}
-
-std::unique_ptr<const WeightEvaluator> Prepared(const std::string& id,
-                                                const Rig& rig,
-                                                const SchemeOptions& options) {
-  return FindScheme(id).value()->Prepare(rig, options).value();
-}
-
-WeightBlock Weights(const std::string& id, const Positions& handles,
-                    const Positions& points, const SchemeOptions& options = {},
-                    int dimension = 3) {
-  WeightBlock block;
-  Prepared(id, HandlesOf(handles, dimension), options)->Evaluate(points, block);
-  return block;
-}
-
-Positions OnePoint(double x, double y, double z) {
-  Positions point(1, 3);
-  point << x, y, z;
-  return point;
-}
-
-Positions CubeCorners() { return Cuboid({-1, -1, -1}, {1, 1, 1}).positions; }
-
-Positions RandomPositions(int64_t n, std::mt19937_64& random) {
-  std::uniform_real_distribution<double> uniform(-1, 1);
-  Positions positions(n, 3);
-  for (int64_t i = 0; i < n; ++i) {
-    for (int d = 0; d < 3; ++d) positions(i, d) = uniform(random);
-  }
-  return positions;
-}
-
-// Points strictly inside the hull: mixtures of five handles each.
-Positions RandomInside(const Positions& handles, int64_t n,
-                       std::mt19937_64& random) {
-  std::uniform_int_distribution<int64_t> index(0, handles.rows() - 1);
-  std::exponential_distribution<double> share;
-  Positions points(n, 3);
-  for (int64_t i = 0; i < n; ++i) {
-    const Vec3 centre = handles.colwise().mean();
-    Vec3 sum = 0.05 * centre;
-    double total = 0.05;
-    for (int k = 0; k < 5; ++k) {
-      const double s = share(random);
-      sum += s * handles.row(index(random)).transpose();
-      total += s;
-    }
-    points.row(i) = sum / total;
-  }
-  return points;
-}
-
-// |sum beta q| / sum beta, from the weights: alpha_i d_i is beta_i up to a
-// factor.
-double Residual(const WeightBlock& block, const Positions& handles,
-                const Positions& points, int64_t i) {
-  Vec3 sum = Vec3::Zero();
-  double total = 0;
-  for (int64_t k = 0; k < handles.rows(); ++k) {
-    const Vec3 offset = (handles.row(k) - points.row(i)).transpose();
-    sum += block.vertex(i, k) * offset;
-    total += block.vertex(i, k) * offset.norm();
-  }
-  return sum.norm() / total;
-}
-
-// A scheme with options, as the tests below go through all of them.
-struct Variant {
-  std::string name;
-  std::string id;
-  bool user_weights = false;
-
-  SchemeOptions OptionsFor(int64_t handles) const {
-    SchemeOptions options;
-    for (int64_t k = 0; user_weights && k < handles; ++k) {
-      options.handle_weights.push_back(k % 3 == 0 ? 0.0 : 0.5 * (k % 5));
-    }
-    return options;
-  }
-};
-
-void PrintTo(const Variant& variant, std::ostream* out) {
-  *out << variant.name;
-}
 
 class Celestial : public testing::TestWithParam<Variant> {
  protected:
@@ -254,108 +162,6 @@ TEST_P(Celestial, PointsOutsideTheHullAreToldAndGetNoWeights) {
   EXPECT_EQ(block.vertex.cwiseAbs().maxCoeff(), 0);
 }
 
-// A cube turned out of the axes, with two handles inside.
-struct TurnedCube {
-  Eigen::Matrix3d turn =
-      Eigen::AngleAxisd(0.9, Vec3(1, 2, -1).normalized()).toRotationMatrix();
-  Vec3 At(double x, double y, double z) const {
-    return turn * Vec3(x, y, z) + Vec3(0.3, 0.1, 5);
-  }
-  Positions handles() const {
-    Positions p(10, 3);
-    p << CubeCorners(), 0.1, 0.2, 0.3, -0.5, 0.4, 0.1;
-    for (int64_t i = 0; i < p.rows(); ++i) {
-      p.row(i) = At(p(i, 0), p(i, 1), p(i, 2)).transpose();
-    }
-    return p;
-  }
-};
-
-class CelestialOnTheHull : public testing::TestWithParam<std::string> {};
-
-INSTANTIATE_TEST_SUITE_P(, CelestialOnTheHull, testing::Values("t_cc", "s_cc"));
-
-TEST_P(CelestialOnTheHull, OnlyTheFaceCounts) {
-  const TurnedCube cube;
-  const Positions handles = cube.handles();
-  std::mt19937_64 random(8);
-  std::uniform_real_distribution<double> uniform(-0.95, 0.95);
-  Positions points(200, 3);
-  Positions flat(200, 3);
-  for (int64_t i = 0; i < points.rows(); ++i) {
-    flat.row(i) << uniform(random), uniform(random), 0;
-    points.row(i) = cube.At(1, flat(i, 0), flat(i, 1)).transpose();
-  }
-  // The same scheme in the plane of the face.
-  Positions square(4, 3);
-  square << -1, -1, 0, -1, 1, 0, 1, -1, 0, 1, 1, 0;
-  const WeightBlock expected = Weights(GetParam(), square, flat, {}, 2);
-  const WeightBlock block = Weights(GetParam(), handles, points);
-  for (int64_t i = 0; i < points.rows(); ++i) {
-    ASSERT_NE(block.states[i], PointState::kOutsideHull) << i;
-    ASSERT_NE(block.states[i], PointState::kNotConverged) << i;
-    for (int64_t k = 0; k < 8; ++k) {
-      const Eigen::RowVector3d corner = CubeCorners().row(k);
-      double weight = 0;
-      for (int64_t c = 0; c < 4; ++c) {
-        if (corner.x() > 0 && square(c, 0) == corner.y() &&
-            square(c, 1) == corner.z()) {
-          weight = expected.vertex(i, c);
-        }
-      }
-      // Rounded coordinates may lie 1e-15 inside, and S-CC goes like the root.
-      EXPECT_NEAR(block.vertex(i, k), weight, 1e-6) << i;
-    }
-  }
-}
-
-TEST_P(CelestialOnTheHull, OnAnEdgeOnlyItsEndsCount) {
-  const TurnedCube cube;
-  for (const double t : {-0.9, -0.3, 0.0, 0.6}) {
-    const WeightBlock block =
-        Weights(GetParam(), cube.handles(), cube.At(1, t, -1).transpose());
-    ASSERT_NE(block.states[0], PointState::kOutsideHull) << t;
-    const Positions handles = cube.handles();
-    for (int64_t k = 0; k < handles.rows(); ++k) {
-      const double reach =
-          (handles.row(k) - cube.At(1, t, -1).transpose()).norm();
-      const bool below =
-          (handles.row(k) - cube.At(1, -1, -1).transpose()).norm() < 1e-9;
-      const bool above =
-          (handles.row(k) - cube.At(1, 1, -1).transpose()).norm() < 1e-9;
-      const double expected = below || above ? 1 - reach / 2 : 0;
-      EXPECT_NEAR(block.vertex(0, k), expected, 1e-6) << t;
-    }
-  }
-}
-
-TEST_P(CelestialOnTheHull, AnExactPlaceIsToldAsBoundary) {
-  const WeightBlock block =
-      Weights(GetParam(), CubeCorners(), OnePoint(1, 0.25, -0.5));
-  EXPECT_EQ(block.states[0], PointState::kBoundary);
-  EXPECT_LT((block.vertex * CubeCorners() - OnePoint(1, 0.25, -0.5)).norm(),
-            1e-15);
-}
-
-TEST(TranslationOnTheHull, UserWeightsOnTheFaceCountAndOthersRuleItOut) {
-  const Positions corners = CubeCorners();
-  SchemeOptions on_face;
-  SchemeOptions off_face;
-  for (int64_t k = 0; k < 8; ++k) {
-    on_face.handle_weights.push_back(corners(k, 0) > 0 ? 1.0 + k : 0);
-    off_face.handle_weights.push_back(corners(k, 0) < 0 ? 0.1 : 0);
-  }
-  const Positions point = OnePoint(1, 0.25, -0.5);
-  const WeightBlock bound = Weights("t_cc", corners, point, on_face);
-  EXPECT_EQ(bound.states[0], PointState::kBoundary);
-  EXPECT_LT((bound.vertex * corners - point).norm(), 1e-15);
-  const WeightBlock plain = Weights("t_cc", corners, point);
-  EXPECT_GT((bound.vertex - plain.vertex).norm(), 0.01);
-  const WeightBlock refused = Weights("t_cc", corners, point, off_face);
-  EXPECT_EQ(refused.states[0], PointState::kOutsideHull);
-  EXPECT_EQ(refused.vertex.cwiseAbs().maxCoeff(), 0);
-}
-
 TEST(Scaling, LambdaDoesNotChangeWeights) {
   std::mt19937_64 random(9);
   const Positions handles = RandomPositions(20, random);
@@ -470,110 +276,6 @@ TEST(CelestialSchemes, NeedHandles) {
     EXPECT_THAT(std::string(status.message()),
                 HasSubstr("needs handles, but the rig is a cage"));
   }
-}
-
-// Handles and points inside that are hard in their own way.
-struct Scene {
-  Positions handles;
-  Positions points;
-};
-
-Scene Random30(int64_t n, std::mt19937_64& random) {
-  const Positions handles = RandomPositions(30, random);
-  return {handles, RandomInside(handles, n, random)};
-}
-
-Scene Random200(int64_t n, std::mt19937_64& random) {
-  const Positions handles = RandomPositions(200, random);
-  return {handles, RandomInside(handles, n, random)};
-}
-
-// Four clusters of six handles, a thousandth wide.
-Scene Clustered(int64_t n, std::mt19937_64& random) {
-  const Positions corners = Tetrahedron().positions;
-  Positions handles = 1e-3 * RandomPositions(24, random);
-  for (int64_t k = 0; k < 24; ++k) handles.row(k) += corners.row(k / 6);
-  return {handles, RandomInside(handles, n, random)};
-}
-
-// All handles but three on one side of most points.
-Scene Skew(int64_t n, std::mt19937_64& random) {
-  Positions handles = 0.2 * RandomPositions(24, random);
-  handles.row(0) << 10, 0, 0;
-  handles.row(1) << 0, 10, 0;
-  handles.row(2) << 0, 0, 10;
-  return {handles, RandomInside(handles, n, random)};
-}
-
-// 1e-6 of the diagonal inside a face of a turned cube.
-Scene NearHull(int64_t n, std::mt19937_64& random) {
-  const TurnedCube cube;
-  std::uniform_real_distribution<double> uniform(-0.98, 0.98);
-  Positions points(n, 3);
-  for (int64_t i = 0; i < n; ++i) {
-    points.row(i) = cube.At(1 - 3.5e-6, uniform(random), uniform(random));
-  }
-  return {cube.handles(), points};
-}
-
-struct NamedScene {
-  std::string name;
-  Scene (*draw)(int64_t, std::mt19937_64&);
-};
-
-void PrintTo(const NamedScene& scene, std::ostream* out) { *out << scene.name; }
-
-class CelestialNeverFails : public testing::TestWithParam<NamedScene> {};
-
-INSTANTIATE_TEST_SUITE_P(, CelestialNeverFails,
-                         testing::Values(NamedScene{"Random", &Random30},
-                                         NamedScene{"Clustered", &Clustered},
-                                         NamedScene{"Skew", &Skew},
-                                         NamedScene{"NearHull", &NearHull},
-                                         NamedScene{"TwoHundredHandles",
-                                                    &Random200}),
-                         [](const auto& test) { return test.param.name; });
-
-// 7000 points, a hundred for each of 70 sets of handles.
-void ExpectSolved(const Variant& variant,
-                  Scene (*scene)(int64_t, std::mt19937_64&),
-                  double residual_bound, int iteration_bound) {
-  std::mt19937_64 random(11);
-  double residual = 0;
-  int iterations = 0;
-  int64_t failures = 0;
-  for (int draw = 0; draw < 70; ++draw) {
-    const Scene drawn = scene(100, random);
-    const WeightBlock block = Weights(variant.id, drawn.handles, drawn.points,
-                                      variant.OptionsFor(drawn.handles.rows()));
-    for (int64_t i = 0; i < drawn.points.rows(); ++i) {
-      if (block.states[i] != PointState::kInside) {
-        ++failures;
-        continue;
-      }
-      residual =
-          std::max(residual, Residual(block, drawn.handles, drawn.points, i));
-      iterations = std::max<int>(iterations, block.iterations[i]);
-    }
-  }
-  EXPECT_EQ(failures, 0);
-  EXPECT_LE(residual, residual_bound);
-  EXPECT_LE(iterations, iteration_bound);
-}
-
-TEST_P(CelestialNeverFails, ByScaling) {
-  ExpectSolved({"", "s_cc"}, GetParam().draw, 1e-12, 25);
-}
-
-TEST_P(CelestialNeverFails, ByTranslation) {
-  ExpectSolved({"", "t_cc"}, GetParam().draw, 1e-12, 25);
-}
-
-TEST_P(CelestialNeverFails, ByTranslationWithUserWeights) {
-  // Next to the hull the exponents are huge and cost digits.
-  const bool near = GetParam().name == "NearHull";
-  ExpectSolved({"", "t_cc", true}, GetParam().draw, near ? 1e-9 : 1e-12,
-               near ? 200 : 60);
 }
 
 }  // namespace

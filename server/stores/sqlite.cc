@@ -30,9 +30,7 @@ absl::Status SqliteError(sqlite3* database, int result) {
   const int system = primary == SQLITE_IOERR || primary == SQLITE_CANTOPEN
                          ? SystemError(database)
                          : 0;
-  if (primary == SQLITE_FULL ||
-      ((primary == SQLITE_IOERR || primary == SQLITE_CANTOPEN) &&
-       (system == ENOSPC || system == EDQUOT))) {
+  if (primary == SQLITE_FULL || system == ENOSPC || system == EDQUOT) {
     code = absl::StatusCode::kResourceExhausted;
     reason = "DISK_FULL";
   } else if (primary == SQLITE_CORRUPT || primary == SQLITE_NOTADB ||

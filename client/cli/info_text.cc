@@ -136,63 +136,46 @@ Json ToJson(const SchemeInfo& scheme) {
           {"uses_normals", scheme.uses_normals}};
 }
 
-void Describe(const ModelInfo& model, std::ostream& out) {
-  Properties properties(out);
-  properties.Add("model", model.model_id);
-  properties.Add("name", model.display_name);
-  properties.Add(
-      "points",
-      absl::StrFormat("%s in %dD, %s triangles", Thousands(model.vertex_count),
-                      model.dimension, Thousands(model.face_count)));
-  properties.Add("box", absl::StrCat(Corner(model.box_min), " to ",
-                                     Corner(model.box_max)));
-  properties.Add("created", TimeText(model.create_time));
-}
+namespace {
 
-void Describe(const BindingInfo& binding, std::ostream& out) {
-  Properties properties(out);
-  properties.Add("binding", binding.binding_id);
-  properties.Add("model", binding.model_id);
-  properties.Add("scheme", binding.scheme);
-  properties.Add("points",
-                 absl::StrFormat("%s in %dD", Thousands(binding.point_count),
-                                 binding.dimension));
+std::string RigText(const BindingInfo& binding) {
   std::string fixed;
   if (binding.fixed_handle_count > 0) {
     fixed = Thousands(binding.fixed_handle_count) + " fixed handles, ";
   }
-  properties.Add(
-      "rig",
-      absl::StrFormat("%s vertices, %s%s normals, diagonal %.6g",
-                      Thousands(binding.vertex_count), fixed,
-                      Thousands(binding.normal_count), binding.rig_diagonal));
-  properties.Add("weights", absl::StrFormat("%s, computed in %s",
-                                            Bytes(binding.weight_bytes),
-                                            Seconds(binding.compute_seconds)));
+  return absl::StrFormat("%s vertices, %s%s normals, diagonal %.6g",
+                         Thousands(binding.vertex_count), fixed,
+                         Thousands(binding.normal_count), binding.rig_diagonal);
+}
+
+std::string KeptText(const BindingInfo& binding) {
   std::string kept = WeightStateText(binding.weight_state);
   if (binding.weight_state == WeightState::kComputing) {
     absl::StrAppendFormat(&kept, ", %s of %s points",
                           Thousands(binding.points_done),
                           Thousands(binding.points_total));
   }
-  properties.Add("kept", absl::StrFormat("%s; %d users, last use %s", kept,
-                                         binding.weight_users,
-                                         TimeText(binding.last_use_time)));
-  const BindQuality& quality = binding.quality;
+  return absl::StrFormat("%s; %d users, last use %s", kept,
+                         binding.weight_users, TimeText(binding.last_use_time));
+}
+
+void DescribeQuality(const BindQuality& quality, Properties& properties) {
   properties.Add(
       "quality",
       absl::StrFormat("reproduces the model to %.2g of the diagonal; weights "
                       "%.3g to %.3g, sum to 1 within %.2g",
                       quality.reproduction_error, quality.weight_min,
                       quality.weight_max, quality.partition_error));
-  if (quality.iterations_total > 0) {
-    properties.Add(
-        "solver",
-        absl::StrFormat("%.1f steps a point, %d at most; residual "
-                        "%.2g, %.2g at most",
-                        quality.iterations_mean, quality.iterations_max,
-                        quality.residual_mean, quality.residual_max));
-  }
+  if (quality.iterations_total == 0) return;
+  properties.Add(
+      "solver", absl::StrFormat("%.1f steps a point, %d at most; residual "
+                                "%.2g, %.2g at most",
+                                quality.iterations_mean, quality.iterations_max,
+                                quality.residual_mean, quality.residual_max));
+}
+
+// Points with something to be told of each: outside, not bound, clamped.
+void DescribePoints(const BindingInfo& binding, Properties& properties) {
   for (const ExitPartInfo& part : binding.exit_parts) {
     std::string crossed;
     if (!part.crossed_faces.empty()) {
@@ -215,6 +198,38 @@ void Describe(const BindingInfo& binding, std::ostream& out) {
                                               Thousands(binding.clamped_count),
                                               FirstOf(binding.clamped, 10)));
   }
+}
+
+}  // namespace
+
+void Describe(const ModelInfo& model, std::ostream& out) {
+  Properties properties(out);
+  properties.Add("model", model.model_id);
+  properties.Add("name", model.display_name);
+  properties.Add(
+      "points",
+      absl::StrFormat("%s in %dD, %s triangles", Thousands(model.vertex_count),
+                      model.dimension, Thousands(model.face_count)));
+  properties.Add("box", absl::StrCat(Corner(model.box_min), " to ",
+                                     Corner(model.box_max)));
+  properties.Add("created", TimeText(model.create_time));
+}
+
+void Describe(const BindingInfo& binding, std::ostream& out) {
+  Properties properties(out);
+  properties.Add("binding", binding.binding_id);
+  properties.Add("model", binding.model_id);
+  properties.Add("scheme", binding.scheme);
+  properties.Add("points",
+                 absl::StrFormat("%s in %dD", Thousands(binding.point_count),
+                                 binding.dimension));
+  properties.Add("rig", RigText(binding));
+  properties.Add("weights", absl::StrFormat("%s, computed in %s",
+                                            Bytes(binding.weight_bytes),
+                                            Seconds(binding.compute_seconds)));
+  properties.Add("kept", KeptText(binding));
+  DescribeQuality(binding.quality, properties);
+  DescribePoints(binding, properties);
   for (const std::string& warning : binding.warnings) {
     properties.Add("warning", warning);
   }

@@ -68,6 +68,12 @@ std::vector<double> VolumeChangeOf(const PoseQuality& pose, int64_t count) {
                 [](const PointQuality& point) { return point.volume_change; });
 }
 
+std::vector<double> DisplacementOf(const Positions& rest,
+                                   const Positions& deformed) {
+  const Eigen::VectorXd lengths = (deformed - rest).rowwise().norm();
+  return std::vector<double>(lengths.begin(), lengths.end());
+}
+
 Chart ValueChart(const std::vector<double>& values, const ColorScale& scale) {
   constexpr int kBins = 40;
   std::vector<int64_t> counts(kBins, 0);

@@ -13,14 +13,13 @@
 #include "client/cli/motion.h"
 #include "client/cli/picture_options.h"
 #include "client/cli/progress.h"
+#include "client/cli/quality_picture.h"
 #include "client/cli/quality_text.h"
 #include "client/cli/stage.h"
 #include "core/base/status_macros.h"
 
 namespace deform::cli {
 namespace {
-
-constexpr int64_t kMostPoints = 1000000;
 
 struct Options {
   RigOptions rig;  // Of which each scheme takes the cage or the handles.
@@ -124,9 +123,7 @@ absl::StatusOr<std::vector<double>> ValuesFor(const Options& options,
   if (options.color == "distortion") {
     return DistortionOf(*scheme.quality.pose, points);
   }
-  const Positions moved = scheme.deformed - stage.model()->positions;
-  const Eigen::VectorXd lengths = moved.rowwise().norm();
-  return std::vector<double>(lengths.begin(), lengths.end());
+  return DisplacementOf(stage.model()->positions, scheme.deformed);
 }
 
 absl::StatusOr<ComparedScheme> Compare(const Options& options, Context& context,
@@ -148,13 +145,13 @@ absl::StatusOr<ComparedScheme> Compare(const Options& options, Context& context,
   Progress measuring(context.console, absl::StrCat("measuring ", name),
                      &context.interruption);
   DEFORM_ASSIGN_OR_RETURN(
-      scheme.quality,
-      stage->client().GetQuality(
-          {.binding_id = stage->binding().binding_id,
-           .pose = pose,
-           .max_points = std::min(stage->binding().point_count, kMostPoints),
-           .with_points = true},
-          measuring.callback()));
+      scheme.quality, stage->client().GetQuality(
+                          {.binding_id = stage->binding().binding_id,
+                           .pose = pose,
+                           .max_points = std::min(stage->binding().point_count,
+                                                  kMostMeasuredPoints),
+                           .with_points = true},
+                          measuring.callback()));
   DEFORM_ASSIGN_OR_RETURN(scheme.values, ValuesFor(options, *stage, scheme));
   if (comparison.rest.rows() == 0 || (caged && !comparison.rest_caged)) {
     comparison.dimension = stage->binding().dimension;

@@ -19,9 +19,6 @@
 namespace deform::cli {
 namespace {
 
-// As many points as the server measures.
-constexpr int64_t kMostPoints = 1000000;
-
 struct Options {
   StageOptions stage;
   std::string session;
@@ -110,7 +107,7 @@ absl::StatusOr<QualityInfo> Measure(const Options& options, Context& context,
   }
   if (!options.png.empty() && pose) {
     // Every point has its colour.
-    query.max_points = std::min(points, kMostPoints);
+    query.max_points = std::min(points, kMostMeasuredPoints);
     query.with_points = true;
   }
   Progress measuring(context.console, "measuring", &context.interruption);
@@ -132,9 +129,7 @@ absl::StatusOr<Shown> ShownOf(const Options& options, Stage& stage,
         of_face ? absl::StrCat("weight of the normal of face ", options.face)
                 : absl::StrCat("weight of vertex ", options.handle));
   } else if (options.color == "displacement") {
-    for (int64_t i = 0; i < rest.rows(); ++i) {
-      shown.values.push_back((deformed.row(i) - rest.row(i)).norm());
-    }
+    shown.values = DisplacementOf(rest, deformed);
     shown.scale = LinearScale(shown.values, "displacement, model units");
   } else if (options.color == "volume") {
     const PoseQuality& pose = *quality.pose;
@@ -240,7 +235,7 @@ Action Setup(CLI::App& app) {
   app.add_option("--max-points", options->max_points,
                  "Judge a larger model by a sample of so many points; 0: the "
                  "server's default")
-      ->check(CLI::Range(int64_t{0}, kMostPoints))
+      ->check(CLI::Range(int64_t{0}, kMostMeasuredPoints))
       ->capture_default_str();
   app.add_option("--png", options->png,
                  "Picture of the model in colours, with a histogram")

@@ -1,19 +1,14 @@
-// deformctl against a live server.
+// deformctl against a live server: models, bindings, sessions and frames.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "client/cli/exit_code.h"
 #include "core/files/mesh_file.h"
-#include "tests/client/cli/cli_run.h"
-#include "tests/client/verify/hand_made.h"
-#include "tests/end_to_end/running_server.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/end_to_end/cli_fixture.h"
 
 namespace deform::cli {
 namespace {
@@ -21,56 +16,8 @@ namespace {
 using testing::EndsWith;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::Not;
 using testing::SizeIs;
 using testing::StartsWith;
-
-class Cli : public testing::Test {
- protected:
-  Cli() {
-    Write("ball.obj", ObjText(Ball().positions(), Ball().faces()));
-    Write("cube.obj", ObjText(Cube().vertices(), Cube().faces()));
-    Positions posed = Cube().vertices();
-    posed.col(0) = posed.col(0).array() * 1 + 5;
-    Write("moved.obj", ObjText(posed, Cube().faces()));
-  }
-
-  std::string Path(const std::string& name) { return folder_.Path(name); }
-  std::string Write(const std::string& name, const std::string& text) {
-    return folder_.Write(name, text);
-  }
-  std::string Read(const std::string& name) {
-    std::ifstream stream(Path(name), std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
-
-  CliResult Run(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {"--server", server_.address()});
-    return RunCli(arguments);
-  }
-  Json RunJson(std::vector<std::string> arguments) {
-    arguments.push_back("--json");
-    const CliResult result = Run(arguments);
-    EXPECT_EQ(result.exit_code, kOk) << result.out << result.err;
-    return result.json();
-  }
-
-  std::string Register() {
-    return RunJson({"register", Path("ball.obj")})["model_id"];
-  }
-  std::string Bind() {
-    return RunJson(
-        {"bind", Register(), "--cage", Path("cube.obj")})["binding_id"];
-  }
-  bool ServerIsEmpty() {
-    return server_.client().ListModels()->empty() &&
-           server_.client().ListBindings()->empty() &&
-           server_.client().ListSessions()->empty();
-  }
-
-  RunningServer server_;
-  const TemporaryFolder folder_;
-};
 
 TEST_F(Cli, RegisterPrintsTheIdAlone) {
   const CliResult result = Run({"register", Path("ball.obj")});
@@ -337,244 +284,6 @@ TEST_F(Cli, TenantsDoNotSeeEachOther) {
               SizeIs(0));
 }
 
-TEST_F(Cli, VerifyPassesAServerThatIsRight) {
-  Write("triangle.json", TriangleCase().dump());
-  Write("index.json", R"([{"file": "triangle.json"}])");
-  const CliResult result = Run({"verify", folder_.Path("")});
-  EXPECT_EQ(result.exit_code, kOk) << result.out << result.err;
-  EXPECT_THAT(result.out, HasSubstr("scc.hand"));
-  EXPECT_THAT(result.out, HasSubstr("OK: 1 cases, 2 queries, 0 failures"));
-  EXPECT_TRUE(ServerIsEmpty());
-}
-
-TEST_F(Cli, VerifyFailsAWrongWeightAndNamesTheQuery) {
-  nlohmann::json wrong = TriangleCase();
-  wrong["queries"][0]["expected"]["alpha"][1] = "0.333333333";
-  Write("triangle.json", wrong.dump());
-  const CliResult result = Run({"verify", folder_.Path("")});
-  EXPECT_EQ(result.exit_code, kCheckFailed);
-  EXPECT_THAT(result.out,
-              HasSubstr("FAIL triangle query 0: vertex weight 1 is off by"));
-  EXPECT_THAT(result.out, HasSubstr("FAILED: 1 cases"));
-  EXPECT_TRUE(ServerIsEmpty());
-}
-
-TEST_F(Cli, VerifyFailsAWrongPosition) {
-  nlohmann::json wrong = TriangleCase();
-  wrong["queries"][0]["expected"]["deformed"]["moved"][0] = "2.001";
-  Write("triangle.json", wrong.dump());
-  const CliResult result = Run({"verify", folder_.Path(""), "--json"});
-  EXPECT_EQ(result.exit_code, kCheckFailed);
-  EXPECT_EQ(result.err, "");
-  const Json report = result.json();
-  EXPECT_EQ(report["ok"], false);
-  EXPECT_EQ(report["groups"][0]["failures"], 1);
-  EXPECT_EQ(report["failures"][0]["query"], 0);
-  EXPECT_THAT(report["failures"][0]["message"].get<std::string>(),
-              HasSubstr("position in moved is off by"));
-}
-
-TEST_F(Cli, VerifyFailsAnErrorThatDidNotCome) {
-  nlohmann::json wrong = TriangleCase();
-  wrong["queries"][1]["point"] = {"0.5", "0.5"};
-  Write("triangle.json", wrong.dump());
-  EXPECT_THAT(Run({"verify", folder_.Path("")}).out,
-              HasSubstr("query 1: expected error outside_hull, got a result"));
-}
-
-TEST_F(Cli, VerifyFailsWhatItCannotRead) {
-  Write("a.json", TriangleCase().dump());
-  Write("b.json", "{");
-  nlohmann::json unreadable = TriangleCase();
-  unreadable["queries"][0].erase("point");
-  Write("c.json", unreadable.dump());
-  const CliResult result = Run({"verify", folder_.Path("")});
-  EXPECT_EQ(result.exit_code, kCheckFailed);
-  EXPECT_THAT(result.out, HasSubstr("b.json: is not JSON"));
-  EXPECT_THAT(result.out,
-              HasSubstr("c.json: queries[0]: has no field 'point'"));
-}
-
-TEST_F(Cli, VerifyFailsAnEmptyDirectory) {
-  const CliResult empty = Run({"verify", folder_.Path("")});
-  EXPECT_EQ(empty.exit_code, kCheckFailed);
-  EXPECT_THAT(empty.err, HasSubstr("holds no case"));
-  Write("triangle.json", TriangleCase().dump());
-  const CliResult group = Run({"verify", folder_.Path(""), "--group", "gc3d"});
-  EXPECT_EQ(group.exit_code, kCheckFailed);
-  EXPECT_THAT(group.err, HasSubstr("in a group that begins with gc3d"));
-  EXPECT_EQ(Run({"verify", Path("missing")}).exit_code, kCheckFailed);
-}
-
-TEST_F(Cli, VerifySendsWhatIsInvalidAndWantsItRefused) {
-  nlohmann::json invalid = TriangleCase();
-  invalid["control_points"][1][0] = "nan";
-  invalid["deformations"] = nlohmann::json::array();
-  for (auto& query : invalid["queries"]) {
-    query["expected"] = {{"error", "non_finite"}};
-  }
-  Write("invalid.json", invalid.dump());
-  nlohmann::json point = TriangleCase();
-  point["queries"][1]["point"] = {"inf", "0"};
-  Write("point.json", point.dump());
-  const CliResult result = Run({"verify", folder_.Path("")});
-  EXPECT_EQ(result.exit_code, kOk) << result.out;
-  EXPECT_THAT(result.out, HasSubstr("2 cases, 4 queries, 0 failures"));
-}
-
-TEST_F(Cli, VerifyDeletesNothingOfOthers) {
-  Write("triangle.json", TriangleCase().dump());
-  Positions points(2, 3);
-  points << 1, 1, 0, 7, 7, 0;  // The model of the case.
-  const std::string id =
-      server_.client().RegisterModel({2, points, Faces()}, "mine")->model_id;
-  EXPECT_EQ(Run({"verify", folder_.Path("")}).exit_code, kOk);
-  EXPECT_TRUE(server_.client().GetModel(id).ok());
-}
-
-// Width and height of a PNG file, 0 if it is none.
-std::pair<int, int> PngSize(const std::string& bytes) {
-  if (bytes.size() < 24 || bytes.compare(1, 3, "PNG") != 0) return {0, 0};
-  const auto number = [&](size_t at) {
-    int value = 0;
-    for (size_t k = 0; k < 4; ++k) {
-      value = value * 256 + static_cast<unsigned char>(bytes[at + k]);
-    }
-    return value;
-  };
-  return {number(16), number(20)};
-}
-
-TEST_F(Cli, ReportTellsOfABindingAndOfAPose) {
-  const std::string binding = Bind();
-  const CliResult alone = Run({"report", "--binding", binding});
-  EXPECT_EQ(alone.exit_code, kOk) << alone.err;
-  EXPECT_THAT(alone.out, HasSubstr("sum to 1 within"));
-  EXPECT_THAT(alone.out, Not(HasSubstr("distortion")));
-  const Json posed =
-      RunJson({"report", "--binding", binding, "--motion", "twist"});
-  const Json& quality = posed["quality"];
-  EXPECT_EQ(quality["pose"]["point_count"], 162);
-  EXPECT_GT(quality["pose"]["distortion"]["max"], 1.1);
-  EXPECT_EQ(quality["pose"]["volume"]["kind"], "closed");
-  const CliResult human =
-      Run({"report", "--binding", binding, "--pose", Path("moved.obj")});
-  EXPECT_THAT(human.out, HasSubstr("median 1, p99 1, max 1 at point"));
-  EXPECT_THAT(human.out, HasSubstr(" posed: 0.00 % (closed mesh)"));
-}
-
-TEST_F(Cli, ReportTellsOfASession) {
-  const std::string session =
-      server_.client().CreateSession(Bind()).value().session_id;
-  {
-    auto stream = server_.client().Deform(session, Delivery::kEvery).value();
-    Positions wide = Cube().vertices();
-    wide.col(0) *= 3;
-    ASSERT_TRUE(stream.Send({.positions = wide}).ok());
-    stream.Close();
-    Frame frame;
-    while (stream.NextFrame(frame).ok()) {
-    }
-  }
-  for (const bool drawn : {false, true}) {
-    std::vector<std::string> arguments = {"report", "--session", session};
-    if (drawn) {
-      arguments.insert(arguments.end(), {"--model-file", Path("ball.obj"),
-                                         "--png", Path("session.png"),
-                                         "--width", "64", "--height", "64"});
-    }
-    EXPECT_GT(RunJson(arguments)["quality"]["pose"]["distortion"]["max"], 1.1);
-  }
-  EXPECT_EQ(PngSize(Read("session.png")), std::pair(64, 64 + 84 + 200));
-  EXPECT_TRUE(server_.client().GetSession(session).ok());
-  EXPECT_EQ(Run({"report", "--session", "s-none"}).exit_code, kRefused);
-}
-
-TEST_F(Cli, ReportDrawsWhatItIsAskedFor) {
-  for (const char* color :
-       {"distortion", "volume", "displacement", "influence"}) {
-    const CliResult result =
-        Run({"report", "--model-file", Path("ball.obj"), "--cage",
-             Path("cube.obj"), "--motion", "bend", "--png", Path("ball.png"),
-             "--color", color, "--width", "100", "--height", "80"});
-    EXPECT_EQ(result.exit_code, kOk) << result.err;
-    EXPECT_THAT(result.out, HasSubstr("wrote "));
-    EXPECT_EQ(PngSize(Read("ball.png")), std::pair(100, 80 + 84 + 200))
-        << color;
-  }
-  EXPECT_TRUE(ServerIsEmpty());
-}
-
-TEST_F(Cli, ReportSaysWhichWeightsThereAre) {
-  const std::vector<std::string> drawn = {
-      "report", "--model-file", Path("ball.obj"), "--cage",   Path("cube.obj"),
-      "--png",  Path("x.png"),  "--color",        "influence"};
-  const auto with = [&](const char* option, const char* value) {
-    std::vector<std::string> arguments = drawn;
-    arguments.insert(arguments.end(), {option, value});
-    return Run(arguments);
-  };
-  EXPECT_EQ(with("--face", "11").exit_code, kOk);
-  EXPECT_THAT(with("--handle", "8").err,
-              HasSubstr("--handle 8: the rig has 8 vertices"));
-  EXPECT_THAT(with("--face", "12").err,
-              HasSubstr("--face 12: scheme green has weights of 12 normals"));
-  EXPECT_TRUE(ServerIsEmpty());
-}
-
-TEST_F(Cli, CompareShowsEverySchemeOfBothRigs) {
-  const std::vector<std::string> arguments = {"compare",
-                                              "--model-file",
-                                              Path("ball.obj"),
-                                              "--cage",
-                                              Path("cube.obj"),
-                                              "--handles",
-                                              Path("cube.obj"),
-                                              "--motion",
-                                              "twist",
-                                              "--png",
-                                              Path("all.png"),
-                                              "--width",
-                                              "64",
-                                              "--height",
-                                              "64"};
-  const Json json = RunJson(arguments);
-  ASSERT_THAT(json["schemes"], SizeIs(4));
-  const char* const names[] = {"green", "mean_value", "t_cc", "s_cc"};
-  for (int k = 0; k < 4; ++k) {
-    const Json& scheme = json["schemes"][k];
-    EXPECT_EQ(scheme["scheme"], names[k]);
-    EXPECT_GT(scheme["compute_seconds"], 0);
-    EXPECT_EQ(scheme["quality"]["pose"]["point_count"], 162);
-  }
-  // Rest and four schemes.
-  EXPECT_EQ(PngSize(Read("all.png")).first, 5 * 64);
-  EXPECT_TRUE(ServerIsEmpty());
-  const CliResult human = Run(arguments);
-  EXPECT_THAT(human.out, HasSubstr("mean_value"));
-  EXPECT_THAT(human.out, HasSubstr("fold-overs"));
-}
-
-TEST_F(Cli, CompareTakesPosesAndNamedSchemes) {
-  const Json json = RunJson({"compare", "--model-file", Path("ball.obj"),
-                             "--cage", Path("cube.obj"), "--cage-pose",
-                             Path("moved.obj"), "--schemes", "mean_value"});
-  ASSERT_THAT(json["schemes"], SizeIs(1));
-  EXPECT_NEAR(json["schemes"][0]["quality"]["pose"]["distortion"]["max"], 1,
-              1e-9);
-}
-
-TEST_F(Cli, CompareSaysWhatASchemeNeeds) {
-  const auto run = [&](const char* schemes) {
-    return Run({"compare", "--model-file", Path("ball.obj"), "--cage",
-                Path("cube.obj"), "--motion", "bend", "--schemes", schemes});
-  };
-  EXPECT_THAT(run("green,s_cc").err, HasSubstr("scheme s_cc needs --handles"));
-  EXPECT_THAT(run("blue").err, HasSubstr("there is no 'blue'; the server knows "
-                                         "green"));
-  EXPECT_TRUE(ServerIsEmpty());
-}
-
 TEST_F(Cli, AnInterruptedPlayLeavesNothingBehind) {
   std::ostringstream out;
   std::ostringstream err;
@@ -586,19 +295,6 @@ TEST_F(Cli, AnInterruptedPlayLeavesNothingBehind) {
                 {out, err, false, interruption}),
             kInterrupted);
   EXPECT_TRUE(interruption.expected);
-  EXPECT_TRUE(ServerIsEmpty());
-}
-
-TEST_F(Cli, AnInterruptedVerifyLeavesNothingBehind) {
-  Write("triangle.json", TriangleCase().dump());
-  std::ostringstream out;
-  std::ostringstream err;
-  Interruption interruption;
-  interruption.requested = true;
-  EXPECT_EQ(
-      RunDeformctl({"--server", server_.address(), "verify", folder_.Path("")},
-                   {out, err, false, interruption}),
-      kInterrupted);
   EXPECT_TRUE(ServerIsEmpty());
 }
 

@@ -396,7 +396,8 @@ absl::StatusOr<DeformStream> Client::Deform(absl::string_view session_id,
   join.set_delivery(delivery == Delivery::kEvery ? v1::DELIVERY_EVERY
                                                  : v1::DELIVERY_LATEST);
   for (const FrameEncoding* encoding : AllEncodings()) {
-    join.add_encodings(ToString(encoding->id()));
+    // Others need a tolerance, which is not negotiated yet.
+    if (encoding->is_exact()) join.add_encodings(ToString(encoding->id()));
   }
   DEFORM_RETURN_IF_ERROR(stream->Join(join));
   return DeformStream(std::move(stream));

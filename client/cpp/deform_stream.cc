@@ -44,7 +44,7 @@ absl::Status DeformStream::Impl::Join(const v1::Join& join) {
   DEFORM_ASSIGN_OR_RETURN(joined_, FromProto(response_.joined()));
   const FrameEncoding* encoding =
       FindEncoding({joined_.encoding.data(), joined_.encoding.size()});
-  if (encoding == nullptr) {
+  if (encoding == nullptr || !encoding->is_exact()) {
     return absl::InternalError("the server picked an unknown frame encoding");
   }
   assembler_.emplace(*encoding, joined_.dimension, joined_.point_count);

@@ -71,9 +71,12 @@ absl::StatusOr<bool> FrameAssembler::Add(const v1::FrameChunk& chunk,
   DEFORM_RETURN_IF_ERROR(encoding_.Decode(
       {reinterpret_cast<const uint8_t*>(chunk.data().data()),
        chunk.data().size()},
-      dimension_,
-      std::span<float>(frame.positions)
-          .subspan(next_vertex_ * dimension_, count * dimension_)));
+      {.dimension = dimension_,
+       .first = next_vertex_,
+       .count = count,
+       .positions =
+           std::span<float>(frame.positions)
+               .subspan(next_vertex_ * dimension_, count * dimension_)}));
   next_vertex_ += count;
   if (!chunk.last()) return false;
   if (next_vertex_ != point_count_) {

@@ -13,7 +13,7 @@ namespace deform {
 // Puts the chunks of one stream together. Not thread-safe.
 class FrameAssembler {
  public:
-  // `encoding` is borrowed for ever (FindEncoding).
+  // `encoding` is exact and borrowed for ever (FindEncoding).
   FrameAssembler(const FrameEncoding& encoding, int dimension,
                  int64_t point_count);
 

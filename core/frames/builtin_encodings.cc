@@ -1,8 +1,12 @@
+#include "core/base/error.h"
 #include "core/frames/encoding.h"
 
 // To add an encoding: write encodings/<name>.cc with a function
 // <Name>Encoding(), then add one line here.
-#define DEFORM_ENCODINGS(X) X(Float32)
+#define DEFORM_ENCODINGS(X) \
+  X(Float32)                \
+  X(Quantized16)            \
+  X(Predicted)
 
 namespace deform {
 
@@ -23,6 +27,10 @@ const FrameEncoding* FindEncoding(absl::string_view id) {
     if (encoding->id() == id) return encoding;
   }
   return nullptr;
+}
+
+absl::Status BadFrameData(absl::string_view message) {
+  return InvalidInput("BAD_FRAME", "frame.data", message);
 }
 
 }  // namespace deform

@@ -1,19 +1,65 @@
 // The seam for frame encodings: how deformed vertices become bytes, and back.
 //
-// To add one: write encodings/<name>.cc, then add one line to
-// builtin_encodings.cc. Server and C++ client share both directions.
+// To add one: write encodings/<name>.cc, with its format, bit by bit, in
+// encodings/<name>.h, then add one line to builtin_encodings.cc. Server and C++
+// client share both directions.
+//
+// A frame is cut into chunks, each encoded by itself. The bytes depend on what
+// is passed in and on nothing else, so they may be made on any thread, and are
+// shared by all receivers that agree on (revision, encoding, tolerance,
+// reference).
+//
+// Encodings are of two kinds. Those of positions are stateless: a chunk holds
+// vertices in the order of the model. Those on a grid (uses_grid()) write
+// integers (grid.h) in an order of their own (point_order.h), losslessly, and
+// may predict them from a reference: the grid of one other revision that the
+// receiver holds. A frame without a reference is a keyframe. As the integers
+// arrive as they were, errors never accumulate.
+//
+// The tolerance is one: no decoded point is farther than it, in model units,
+// from the point that was given, roundings to float on both sides included.
+// Who deforms with compressed weights passes what their error bound leaves.
 #pragma once
 
 #include <cstdint>
 #include <span>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "core/frames/grid.h"
 
 namespace deform {
 
 // Chunks of a frame hold at most this many bytes.
 inline constexpr int64_t kMaxChunkBytes = int64_t{1} << 20;
+
+// A chunk to be encoded: points [first, first + count) of the frame, in the
+// order of the model, or, on a grid, of its PointOrder.
+struct ChunkSource {
+  int dimension = 3;
+  int64_t first = 0;
+  int64_t count = 0;
+  // For encodings of positions: these points relative to the frame's origin,
+  // count x dimension, and the tolerance.
+  std::span<const float> positions;
+  double tolerance = 0;
+  // For encodings on a grid, whose step is the tolerance: the whole frame, and
+  // its reference, of as many points; null in a keyframe.
+  const Grid* grid = nullptr;
+  const Grid* reference = nullptr;
+};
+
+// Where a chunk is decoded to. As above; grids of another size than the frame's
+// are our mistake.
+struct ChunkTarget {
+  int dimension = 3;
+  int64_t first = 0;
+  int64_t count = 0;
+  std::span<float> positions;
+  Grid* grid = nullptr;
+  const Grid* reference = nullptr;
+};
 
 class FrameEncoding {
  public:
@@ -22,24 +68,34 @@ class FrameEncoding {
   // Name on the wire; it never changes meaning.
   virtual absl::string_view id() const = 0;
 
-  // Vertices of `dimension` coordinates that a chunk holds at most.
-  virtual int64_t VerticesPerChunk(int dimension) const = 0;
+  // Gives back the very floats it was given: needs no tolerance.
+  virtual bool is_exact() const { return false; }
+  virtual bool uses_grid() const { return false; }
 
-  // Writes consecutive vertices, given relative to the frame's origin
-  // (dimension floats each), to `out`, which holds kMaxChunkBytes. Returns the
-  // bytes written.
-  virtual int64_t Encode(std::span<const float> positions, int dimension,
-                         uint8_t* out) const = 0;
+  // Points that a chunk holds at most: then it never exceeds kMaxChunkBytes. On
+  // a grid a multiple of kGridBlock, as is the beginning of every chunk.
+  virtual int64_t PointsPerChunk(int dimension) const = 0;
+
+  // Writes a chunk to `out`, which holds kMaxChunkBytes. Returns the bytes
+  // written, or
+  //   FailedPrecondition TOLERANCE_NOT_MET  says what can be met; the caller
+  //     picks another encoding
+  //   InvalidArgument NON_FINITE
+  virtual absl::StatusOr<int64_t> Encode(const ChunkSource& source,
+                                         uint8_t* out) const = 0;
 
   // The reverse. `bytes` come from outside: InvalidArgument (BAD_FRAME) if they
-  // are not what Encode writes for positions.size() numbers.
-  virtual absl::Status Decode(std::span<const uint8_t> bytes, int dimension,
-                              std::span<float> positions) const = 0;
+  // are not as Encode writes them; what the target holds then is not specified.
+  virtual absl::Status Decode(std::span<const uint8_t> bytes,
+                              const ChunkTarget& target) const = 0;
 };
 
 std::span<const FrameEncoding* const> AllEncodings();
 
 // Null if there is none of this name.
 const FrameEncoding* FindEncoding(absl::string_view id);
+
+// BAD_FRAME, as decoders say it.
+absl::Status BadFrameData(absl::string_view message);
 
 }  // namespace deform

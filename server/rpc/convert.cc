@@ -279,11 +279,17 @@ absl::StatusOr<JoinRequest> FromProto(const v1::Join& join) {
   if (join.encodings().empty()) request.encoding = FindEncoding("float32");
   const int offered = std::min(join.encodings_size(), kMaxEncodings);
   for (int i = 0; i < offered && request.encoding == nullptr; ++i) {
-    request.encoding = FindEncoding(join.encodings(i));
+    const FrameEncoding* const encoding = FindEncoding(join.encodings(i));
+    // Others need a tolerance, which is not negotiated yet.
+    if (encoding != nullptr && encoding->is_exact()) {
+      request.encoding = encoding;
+    }
   }
   if (request.encoding == nullptr) {
     std::vector<absl::string_view> known;
-    for (const FrameEncoding* e : AllEncodings()) known.push_back(e->id());
+    for (const FrameEncoding* e : AllEncodings()) {
+      if (e->is_exact()) known.push_back(e->id());
+    }
     return InvalidInput("UNKNOWN_ENCODING", "encodings",
                         absl::StrCat("none of the encodings is known; known: ",
                                      absl::StrJoin(known, ", ")));

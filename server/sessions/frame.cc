@@ -1,6 +1,7 @@
 #include "server/sessions/frame.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cstring>
 
 namespace deform::server {
@@ -22,8 +23,14 @@ Frame::Chunk EncodeChunk(const Deformer& deformer,
   scratch.bytes.resize(kMaxChunkBytes);
   deformer.CopyRelative(first, count, origin, scratch.positions.data());
   Frame::Chunk chunk{.first_vertex = first, .vertex_count = count};
-  chunk.size =
-      encoding.Encode(scratch.positions, dimension, scratch.bytes.data());
+  const absl::StatusOr<int64_t> size =
+      encoding.Encode({.dimension = dimension,
+                       .first = first,
+                       .count = count,
+                       .positions = scratch.positions},
+                      scratch.bytes.data());
+  assert(size.ok());  // Exact encodings take everything.
+  chunk.size = *size;
   chunk.bytes = std::make_unique_for_overwrite<uint8_t[]>(chunk.size);
   std::memcpy(chunk.bytes.get(), scratch.bytes.data(), chunk.size);
   return chunk;
@@ -35,12 +42,13 @@ std::shared_ptr<const Frame> EncodeFrame(const Deformer& deformer,
                                          const FrameEncoding& encoding,
                                          const FrameInfo& info,
                                          ThreadPool* pool) {
+  assert(encoding.is_exact());
   const int64_t points = deformer.binding().point_count();
   auto frame = std::make_shared<Frame>();
   frame->info = info;
   frame->dimension = deformer.binding().dimension();
   frame->encoding = &encoding;
-  const int64_t per_chunk = encoding.VerticesPerChunk(frame->dimension);
+  const int64_t per_chunk = encoding.PointsPerChunk(frame->dimension);
   const int64_t chunks = (points + per_chunk - 1) / per_chunk;
   frame->chunks.resize(chunks);
   const auto encode = [&](int64_t i) {

@@ -39,7 +39,8 @@ struct Frame {
   std::vector<Chunk> chunks;  // In order; at least one.
 };
 
-// Encodes where `deformer` is, chunks in parallel on `pool` (may be null).
+// Encodes where `deformer` is, chunks in parallel on `pool` (may be null), by
+// an exact encoding: others need a tolerance.
 std::shared_ptr<const Frame> EncodeFrame(const Deformer& deformer,
                                          const FrameEncoding& encoding,
                                          const FrameInfo& info,

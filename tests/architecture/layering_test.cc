@@ -65,7 +65,8 @@ const std::map<std::string, std::vector<std::string>>& CoreArrows() {
           {"core/quality",
            {"core/base", "core/mesh", "core/weights", "core/deform"}},
           {"core/frames",
-           {"core/base", "core/mesh", "core/weights", "core/deform"}},
+           {"core/base", "core/mesh", "core/kernels", "core/weights",
+            "core/deform"}},
       };
   return arrows;
 }

@@ -1,10 +1,9 @@
-// Encoding "float32": little-endian float32, `dimension` per vertex.
+#include "core/frames/encodings/float32.h"
+
 #include <algorithm>
 #include <bit>
 
 #include "absl/strings/str_cat.h"
-#include "core/base/error.h"
-#include "core/frames/encoding.h"
 
 namespace deform {
 namespace {
@@ -15,29 +14,29 @@ static_assert(std::endian::native == std::endian::little,
 class Float32 final : public FrameEncoding {
  public:
   absl::string_view id() const override { return "float32"; }
+  bool is_exact() const override { return true; }
 
-  int64_t VerticesPerChunk(int dimension) const override {
+  int64_t PointsPerChunk(int dimension) const override {
     return kMaxChunkBytes / (dimension * int64_t{sizeof(float)});
   }
 
-  int64_t Encode(std::span<const float> positions, int /*dimension*/,
-                 uint8_t* out) const override {
+  absl::StatusOr<int64_t> Encode(const ChunkSource& source,
+                                 uint8_t* out) const override {
     // Not memcpy: an empty span may have no address.
-    std::copy_n(reinterpret_cast<const uint8_t*>(positions.data()),
-                positions.size_bytes(), out);
-    return static_cast<int64_t>(positions.size_bytes());
+    std::copy_n(reinterpret_cast<const uint8_t*>(source.positions.data()),
+                source.positions.size_bytes(), out);
+    return static_cast<int64_t>(source.positions.size_bytes());
   }
 
-  absl::Status Decode(std::span<const uint8_t> bytes, int /*dimension*/,
-                      std::span<float> positions) const override {
-    if (bytes.size() != positions.size_bytes()) {
-      return InvalidInput(
-          "BAD_FRAME", "frame.data",
-          absl::StrCat("chunk has ", bytes.size(), " bytes, its vertices need ",
-                       positions.size_bytes()));
+  absl::Status Decode(std::span<const uint8_t> bytes,
+                      const ChunkTarget& target) const override {
+    if (bytes.size() != target.positions.size_bytes()) {
+      return BadFrameData(absl::StrCat("chunk has ", bytes.size(),
+                                       " bytes, its vertices need ",
+                                       target.positions.size_bytes()));
     }
     std::copy_n(bytes.data(), bytes.size(),
-                reinterpret_cast<uint8_t*>(positions.data()));
+                reinterpret_cast<uint8_t*>(target.positions.data()));
     return absl::OkStatus();
   }
 };

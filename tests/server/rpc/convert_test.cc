@@ -250,6 +250,7 @@ TEST(ConvertJoin, PicksTheFirstEncodingItKnows) {
   join.set_session_id("s");
   EXPECT_EQ(FromProto(join)->encoding->id(), "float32");
   join.add_encodings("holographic");
+  join.add_encodings("predicted");  // Would need a tolerance.
   join.add_encodings("float32");
   EXPECT_EQ(FromProto(join)->encoding->id(), "float32");
   EXPECT_EQ(FromProto(join)->delivery, Delivery::kLatest);

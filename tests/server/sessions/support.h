@@ -190,7 +190,10 @@ inline Positions Decoded(const Frame& frame) {
     EXPECT_TRUE(
         frame.encoding
             ->Decode({chunk.bytes.get(), static_cast<size_t>(chunk.size)},
-                     frame.dimension, part)
+                     {.dimension = frame.dimension,
+                      .first = chunk.first_vertex,
+                      .count = chunk.vertex_count,
+                      .positions = part})
             .ok());
     all.insert(all.end(), part.begin(), part.end());
   }

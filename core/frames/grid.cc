@@ -1,7 +1,6 @@
 #include "core/frames/grid.h"
 
 #include <algorithm>
-#include <bit>
 #include <cassert>
 #include <cmath>
 
@@ -10,26 +9,6 @@
 
 namespace deform {
 namespace {
-
-// The nearest integer, ties to even, of |x| < 2^31: the sum with 1.5 x 2^52
-// leaves it in the low bits of the mantissa. Other x give some integer. Unlike
-// lrint() it is no call, and can be done several at once.
-int32_t Nearest(double x) {
-  constexpr double kShift = 6755399441055744.0;
-  return static_cast<int32_t>(std::bit_cast<int64_t>(x + kShift));
-}
-
-// Rounds a block of one coordinate. False if a number is beyond the grid's
-// reach or none at all.
-bool RoundBlock(const float* x, double per_step, int32_t* q) {
-  int64_t outside = 0;
-  for (int64_t i = 0; i < kGridBlock; ++i) {
-    const double steps = x[i] * per_step;
-    q[i] = Nearest(steps);
-    outside |= static_cast<int64_t>(!(std::abs(steps) <= kGridLimit));
-  }
-  return outside == 0;
-}
 
 // Why point `i` of the model is not on the grid; Ok if it is.
 absl::Status CheckOnGrid(const float* x, int dimension, double step,
@@ -86,7 +65,8 @@ absl::StatusOr<Grid> PutOnGrid(std::span<const float> positions, int dimension,
     }
     bool within = true;
     for (int d = 0; d < dimension; ++d) {
-      within &= RoundBlock(block[d], per_step, grid.coordinate(d) + first);
+      within &= RoundToGrid(block[d], per_step, kGridLimit,
+                            grid.coordinate(d) + first);
     }
     if (within) continue;
     for (int64_t i = first; i < first + count; ++i) {
@@ -105,10 +85,18 @@ void TakeOffGrid(const Grid& grid, double step, const PointOrder& order,
                  int dimension, std::span<float> positions) {
   assert(grid.size() == order.size() &&
          static_cast<int64_t>(positions.size()) == grid.size() * dimension);
-  for (int64_t i = 0; i < grid.size(); ++i) {
-    float* const x = positions.data() + order.points()[i] * int64_t{dimension};
+  alignas(64) float block[3][kGridBlock];
+  for (int64_t first = 0; first < grid.size(); first += kGridBlock) {
     for (int d = 0; d < dimension; ++d) {
-      x[d] = static_cast<float>(grid.coordinate(d)[i] * step);
+      LeaveGrid(grid.coordinate(d) + first, step, block[d]);
+    }
+    const int64_t count = std::min(kGridBlock, grid.size() - first);
+    for (int64_t i = 0; i < count; ++i) {
+      const int64_t point = order.points()[first + i];
+      float* const x = positions.data() + point * dimension;
+      x[0] = block[0][i];
+      x[1] = block[1][i];
+      if (dimension == 3) x[2] = block[2][i];
     }
   }
 }

@@ -24,6 +24,36 @@ using Words = hn::Vec<decltype(kWords)>;
 constexpr int64_t kLanes = static_cast<int64_t>(hn::MaxLanes(kInts));
 constexpr int64_t kPlaneBytes = kGridGroup / 8;
 
+// Vectors of doubles, and half as long ones of what becomes of them.
+constexpr hn::CappedTag<double, 8> kDoubles;
+constexpr hn::Rebind<float, decltype(kDoubles)> kHalfFloats;
+constexpr hn::Rebind<int32_t, decltype(kDoubles)> kHalfInts;
+constexpr int64_t kHalfLanes = static_cast<int64_t>(hn::MaxLanes(kDoubles));
+
+bool RoundToGrid(const float* HWY_RESTRICT x, double per_step, double limit,
+                 int32_t* HWY_RESTRICT grid) {
+  const auto scale = hn::Set(kDoubles, per_step);
+  const auto most = hn::Set(kDoubles, limit);
+  auto within = hn::Eq(scale, scale);
+  for (int64_t i = 0; i < kGridBlock; i += kHalfLanes) {
+    const auto steps =
+        hn::Mul(hn::PromoteTo(kDoubles, hn::LoadU(kHalfFloats, x + i)), scale);
+    within = hn::And(within, hn::Le(hn::Abs(steps), most));
+    hn::StoreU(hn::DemoteTo(kHalfInts, hn::Round(steps)), kHalfInts, grid + i);
+  }
+  return hn::AllTrue(kDoubles, within);
+}
+
+void LeaveGrid(const int32_t* HWY_RESTRICT grid, double step,
+               float* HWY_RESTRICT x) {
+  const auto scale = hn::Set(kDoubles, step);
+  for (int64_t i = 0; i < kGridBlock; i += kHalfLanes) {
+    const auto steps = hn::PromoteTo(kDoubles, hn::LoadU(kHalfInts, grid + i));
+    hn::StoreU(hn::DemoteTo(kHalfFloats, hn::Mul(steps, scale)), kHalfFloats,
+               x + i);
+  }
+}
+
 HWY_INLINE Ints Load(const int32_t* numbers) {
   return hn::LoadU(kInts, numbers);
 }
@@ -209,12 +239,22 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace deform {
 
+HWY_EXPORT(RoundToGrid);
+HWY_EXPORT(LeaveGrid);
 HWY_EXPORT(MeasureExtent);
 HWY_EXPORT(SumMoments);
 HWY_EXPORT(FoldResiduals);
 HWY_EXPORT(AddResiduals);
 HWY_EXPORT(PackBits);
 HWY_EXPORT(UnpackBits);
+
+bool RoundToGrid(const float* x, double per_step, double limit, int32_t* grid) {
+  return HWY_DYNAMIC_DISPATCH(RoundToGrid)(x, per_step, limit, grid);
+}
+
+void LeaveGrid(const int32_t* grid, double step, float* x) {
+  HWY_DYNAMIC_DISPATCH(LeaveGrid)(grid, step, x);
+}
 
 GridExtent MeasureExtent(const GridBlock& reference, const GridBlock& grid) {
   GridExtent extent;

@@ -16,6 +16,13 @@ namespace deform {
 inline constexpr int64_t kGridBlock = 256;
 inline constexpr int64_t kGridGroup = 64;
 
+// Rounds x(i) * per_step to the nearest integers, ties to even, in double, for
+// one coordinate of a block. False if one is larger than `limit`, which is
+// below 2^31, or none at all; its integer then is any.
+bool RoundToGrid(const float* x, double per_step, double limit, int32_t* grid);
+// x(i) = grid(i) * step, in double, rounded to float.
+void LeaveGrid(const int32_t* grid, double step, float* x);
+
 // One coordinate of a block as a linear function of where the block was in the
 // reference, a: with m = a(0), the place of the block's first point,
 //
@@ -73,6 +80,9 @@ void PackBits(const uint32_t* values, int bits, uint8_t* out);
 void UnpackBits(const uint8_t* planes, int bits, uint32_t* values);
 
 // The judges.
+bool RoundToGridPlain(const float* x, double per_step, double limit,
+                      int32_t* grid);
+void LeaveGridPlain(const int32_t* grid, double step, float* x);
 GridExtent MeasureExtentPlain(const GridBlock& reference,
                               const GridBlock& grid);
 GridMoments SumMomentsPlain(const GridBlock& reference, const GridBlock& grid,

@@ -1,4 +1,5 @@
 // Number by number, as the header says it.
+#include <cmath>
 #include <cstring>
 
 #include "core/kernels/grid_blocks.h"
@@ -31,6 +32,27 @@ int32_t Predicted(const GridBlock& reference, int d, int64_t i,
 }
 
 }  // namespace
+
+bool RoundToGridPlain(const float* x, double per_step, double limit,
+                      int32_t* grid) {
+  bool within = true;
+  for (int64_t i = 0; i < kGridBlock; ++i) {
+    const double steps = x[i] * per_step;
+    if (std::abs(steps) <= limit) {
+      grid[i] = static_cast<int32_t>(std::nearbyint(steps));
+    } else {
+      grid[i] = 0;
+      within = false;
+    }
+  }
+  return within;
+}
+
+void LeaveGridPlain(const int32_t* grid, double step, float* x) {
+  for (int64_t i = 0; i < kGridBlock; ++i) {
+    x[i] = static_cast<float>(grid[i] * step);
+  }
+}
 
 GridExtent MeasureExtentPlain(const GridBlock& reference,
                               const GridBlock& grid) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <functional>
+#include <memory>
 #include <random>
 #include <vector>
 
@@ -161,6 +162,52 @@ TEST(Predicted, NeedsNextToNothingWhereBlocksMoveByALinearMap) {
   EXPECT_GT(SizeOf(Encoded(grid, nullptr, 3)), 2560 * 3 * 10 / 8);
   // And a frame that did not change has no residuals at all.
   EXPECT_LE(SizeOf(Encoded(grid, &grid, 3)), 10 * (1 + 3 * 5));
+}
+
+// The distance of point i between both, N x 3.
+double Distance(const std::vector<float>& a, const std::vector<double>& b,
+                int64_t i) {
+  double squares = 0;
+  for (int d = 0; d < 3; ++d) {
+    squares += std::pow(a[3 * i + d] - b[3 * i + d], 2);
+  }
+  return std::sqrt(squares);
+}
+
+// A drag with jitter, and now and then a jump: each frame is predicted from the
+// one before, as the receiver has decoded it.
+TEST(Predicted, KeepsTenThousandFramesWithinTheTolerance) {
+  constexpr int64_t kPoints = 300;
+  constexpr double kTolerance = 1e-4;
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const Positions rest =
+      Positions::NullaryExpr(kPoints, 3, [&] { return uniform(random); });
+  const PointOrder order(rest);
+  std::vector<double> meant(kPoints * 3);
+  std::vector<float> decoded(kPoints * 3);
+  std::unique_ptr<Grid> sent, received;
+  for (int frame = 0; frame < 10000; ++frame) {
+    const double angle = 0.02 * frame + 0.001 * uniform(random);
+    const double jump = frame % 1000 == 999 ? 50 * uniform(random) : 0;
+    for (int64_t i = 0; i < kPoints; ++i) {
+      const double bend = angle * rest(i, 2);
+      meant[3 * i] = rest(i, 0) + std::sin(bend) + jump;
+      meant[3 * i + 1] = rest(i, 1) * std::cos(bend);
+      meant[3 * i + 2] = rest(i, 2) + 0.001 * uniform(random);
+    }
+    auto grid = std::make_unique<Grid>(
+        PutOnGrid(std::vector<float>(meant.begin(), meant.end()), 3, kTolerance,
+                  order)
+            .value());
+    received = std::make_unique<Grid>(
+        Decoded(Encoded(*grid, sent.get(), 3), kPoints, received.get(), 3));
+    sent = std::move(grid);
+    TakeOffGrid(*received, kTolerance, order, 3, decoded);
+    for (int64_t i = 0; i < kPoints; ++i) {
+      ASSERT_LE(Distance(decoded, meant, i), kTolerance) << "frame " << frame;
+    }
+  }
 }
 
 std::string Hex(const Bytes& bytes) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <hwy/targets.h>
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <functional>
@@ -54,6 +55,47 @@ void OnEveryInstructionSet(const std::function<void()>& check) {
     SCOPED_TRACE(hwy::TargetName(target));
     const OnInstructionSet on(target);
     check();
+  }
+}
+
+TEST(GridBlocks, RoundingIsThatOfThePlainVersion) {
+  std::mt19937 random(9);
+  for (const float reach : {1.0F, 1e3F, 1e9F}) {
+    std::uniform_real_distribution<float> uniform(-reach, reach);
+    std::array<float, kGridBlock> x;
+    for (float& number : x) number = uniform(random);
+    x[7] = 0.5F * reach;  // Ties, and the limit itself.
+    x[8] = std::min(1.5F, reach);
+    x[9] = -reach;
+    for (const double per_step : {1.0, 0.37}) {
+      Numbers judge;
+      ASSERT_TRUE(RoundToGridPlain(x.data(), per_step, reach, judge.data()));
+      std::array<float, kGridBlock> judge_back;
+      LeaveGridPlain(judge.data(), 1 / per_step, judge_back.data());
+      OnEveryInstructionSet([&] {
+        Numbers grid;
+        EXPECT_TRUE(RoundToGrid(x.data(), per_step, reach, grid.data()));
+        EXPECT_EQ(grid, judge);
+        std::array<float, kGridBlock> back;
+        LeaveGrid(judge.data(), 1 / per_step, back.data());
+        EXPECT_EQ(back, judge_back);
+      });
+    }
+  }
+}
+
+TEST(GridBlocks, RoundingTellsOfEveryNumberBeyondTheLimit) {
+  for (const float bad :
+       {5.001F, -5.001F, 3e38F, std::numeric_limits<float>::infinity(),
+        std::numeric_limits<float>::quiet_NaN()}) {
+    for (int64_t at = 0; at < kGridBlock; ++at) {
+      std::array<float, kGridBlock> x = {};
+      x[at] = bad;
+      Numbers grid;
+      ASSERT_FALSE(RoundToGridPlain(x.data(), 1, 5, grid.data()));
+      OnEveryInstructionSet(
+          [&] { ASSERT_FALSE(RoundToGrid(x.data(), 1, 5, grid.data())); });
+    }
   }
 }
 

@@ -17,6 +17,7 @@
   X(Generate)              \
   X(Picture)               \
   X(Verify)                \
+  X(Status)                \
   X(Completion)            \
   X(Version)
 

@@ -7,12 +7,14 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cpp/convert.h"
+#include "client/cpp/deform_call_impl.h"
 #include "client/cpp/deform_stream_impl.h"
 #include "client/cpp/status.h"
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
 #include "deform/v1/binding.grpc.pb.h"
 #include "deform/v1/model.grpc.pb.h"
+#include "deform/v1/server.grpc.pb.h"
 #include "deform/v1/session.grpc.pb.h"
 
 namespace deform {
@@ -49,7 +51,8 @@ struct Client::Impl {
         options(chosen),
         models(v1::ModelService::NewStub(channel)),
         bindings(v1::BindingService::NewStub(channel)),
-        sessions(v1::SessionService::NewStub(channel)) {}
+        sessions(v1::SessionService::NewStub(channel)),
+        server(v1::ServerService::NewStub(channel)) {}
 
   // A call without work behind it.
   template <typename Stub, typename Method, typename Request, typename Response>
@@ -89,17 +92,38 @@ struct Client::Impl {
     return response;
   }
 
+  v1::Join JoinOf(absl::string_view session_id, Delivery delivery,
+                  const std::vector<std::string>& encodings) const {
+    v1::Join join;
+    join.set_tenant(options.tenant);
+    join.set_session_id(ToString(session_id));
+    join.set_delivery(delivery == Delivery::kEvery ? v1::DELIVERY_EVERY
+                                                   : v1::DELIVERY_LATEST);
+    join.mutable_encodings()->Add(encodings.begin(), encodings.end());
+    if (!encodings.empty()) return join;
+    for (const FrameEncoding* encoding : AllEncodings()) {
+      // Others need a tolerance, which is not negotiated yet.
+      if (encoding->is_exact()) join.add_encodings(ToString(encoding->id()));
+    }
+    return join;
+  }
+
   const std::shared_ptr<grpc::Channel> channel;
   const ClientOptions options;
   const std::unique_ptr<v1::ModelService::Stub> models;
   const std::unique_ptr<v1::BindingService::Stub> bindings;
   const std::unique_ptr<v1::SessionService::Stub> sessions;
+  const std::unique_ptr<v1::ServerService::Stub> server;
 };
 
 absl::StatusOr<Client> Client::Connect(absl::string_view target,
                                        const ClientOptions& options) {
+  grpc::ChannelArguments arguments = ChannelArguments();
+  if (options.own_connection) {
+    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  }
   const std::shared_ptr<grpc::Channel> channel = grpc::CreateCustomChannel(
-      ToString(target), grpc::InsecureChannelCredentials(), ChannelArguments());
+      ToString(target), grpc::InsecureChannelCredentials(), arguments);
   if (!channel->WaitForConnected(std::chrono::system_clock::now() +
                                  options.connect_timeout)) {
     return MakeError(absl::StatusCode::kUnavailable,
@@ -387,20 +411,26 @@ absl::Status Client::DeleteSession(absl::string_view session_id) {
                      request, &response);
 }
 
+absl::StatusOr<ServerStatus> Client::GetServerStatus() {
+  v1::GetServerStatusResponse response;
+  DEFORM_RETURN_IF_ERROR(impl_->Call(*impl_->server,
+                                     &v1::ServerService::Stub::GetServerStatus,
+                                     v1::GetServerStatusRequest(), &response));
+  return FromProto(response.status());
+}
+
 absl::StatusOr<DeformStream> Client::Deform(absl::string_view session_id,
                                             Delivery delivery) {
   auto stream = std::make_unique<DeformStream::Impl>(*impl_->sessions);
-  v1::Join join;
-  join.set_tenant(impl_->options.tenant);
-  join.set_session_id(ToString(session_id));
-  join.set_delivery(delivery == Delivery::kEvery ? v1::DELIVERY_EVERY
-                                                 : v1::DELIVERY_LATEST);
-  for (const FrameEncoding* encoding : AllEncodings()) {
-    // Others need a tolerance, which is not negotiated yet.
-    if (encoding->is_exact()) join.add_encodings(ToString(encoding->id()));
-  }
-  DEFORM_RETURN_IF_ERROR(stream->Join(join));
+  DEFORM_RETURN_IF_ERROR(stream->Join(impl_->JoinOf(session_id, delivery, {})));
   return DeformStream(std::move(stream));
+}
+
+std::unique_ptr<DeformCall> Client::StartDeform(
+    absl::string_view session_id, Delivery delivery,
+    const std::vector<std::string>& encodings, DeformEvents& events) {
+  return StartDeformCall(
+      *impl_->sessions, impl_->JoinOf(session_id, delivery, encodings), events);
 }
 
 }  // namespace deform

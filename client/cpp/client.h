@@ -36,6 +36,9 @@
 
 namespace deform {
 
+class DeformCall;
+class DeformEvents;
+
 struct ClientOptions {
   // Separates the data of those who share a server; empty means "default".
   std::string tenant;
@@ -45,6 +48,9 @@ struct ClientOptions {
   // CreateBinding, GetWeights, GetQuality and Deform, which take as long as
   // they need).
   std::chrono::milliseconds call_timeout{30000};
+  // Clients of one server in one program share a connection, unless they want
+  // one of their own.
+  bool own_connection = false;
 };
 
 enum class WeightPrecision {
@@ -135,9 +141,18 @@ class Client {
   absl::StatusOr<std::vector<SessionInfo>> ListSessions();
   absl::Status DeleteSession(absl::string_view session_id);
 
+  // What the server holds, has done, and costs.
+  absl::StatusOr<ServerStatus> GetServerStatus();
+
   // Joins a session: poses in, frames out.
   absl::StatusOr<DeformStream> Deform(absl::string_view session_id,
                                       Delivery delivery = Delivery::kLatest);
+  // The same without a thread that waits, for programs with many streams
+  // (deform_call.h). `encodings` that are taken, best first; empty: all.
+  // `events` is borrowed.
+  std::unique_ptr<DeformCall> StartDeform(
+      absl::string_view session_id, Delivery delivery,
+      const std::vector<std::string>& encodings, DeformEvents& events);
 
  private:
   struct Impl;

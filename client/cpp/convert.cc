@@ -281,6 +281,22 @@ SchemeInfo FromProto(const v1::Scheme& scheme) {
           .uses_normals = scheme.uses_normals()};
 }
 
+ServerStatus FromProto(const v1::ServerStatus& status) {
+  return {.version = status.version(),
+          .uptime_seconds = status.uptime_seconds(),
+          .cpu_seconds = status.cpu_seconds(),
+          .resident_bytes = static_cast<int64_t>(status.resident_bytes()),
+          .processors = static_cast<int>(status.processors()),
+          .models = static_cast<int64_t>(status.models()),
+          .bindings = static_cast<int64_t>(status.bindings()),
+          .sessions = static_cast<int64_t>(status.sessions()),
+          .participants = static_cast<int64_t>(status.participants()),
+          .frames_sent = static_cast<int64_t>(status.frames_sent()),
+          .frame_bytes_sent = static_cast<int64_t>(status.frame_bytes_sent()),
+          .poses_accepted = static_cast<int64_t>(status.poses_accepted()),
+          .poses_rejected = static_cast<int64_t>(status.poses_rejected())};
+}
+
 absl::StatusOr<RigArrays> FromProto(const v1::Rig& rig) {
   RigArrays arrays;
   if (rig.has_handles()) {

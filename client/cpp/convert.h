@@ -8,6 +8,7 @@
 #include "deform/v1/binding.pb.h"
 #include "deform/v1/model.pb.h"
 #include "deform/v1/quality.pb.h"
+#include "deform/v1/server.pb.h"
 #include "deform/v1/session.pb.h"
 
 namespace deform {
@@ -19,6 +20,7 @@ QualityInfo FromProto(const v1::QualityReport& report);
 EditedBinding FromProto(const v1::HandlesEdited& edited);
 SessionInfo FromProto(const v1::Session& session);
 SchemeInfo FromProto(const v1::Scheme& scheme);
+ServerStatus FromProto(const v1::ServerStatus& status);
 
 // InvalidArgument (BAD_ANSWER) if the numbers do not fit together.
 absl::StatusOr<RigArrays> FromProto(const v1::Rig& rig);

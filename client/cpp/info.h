@@ -115,6 +115,23 @@ struct SessionInfo {
   WallTime create_time;
 };
 
+// The server itself; the fields are told in deform/v1/server.proto.
+struct ServerStatus {
+  std::string version;
+  double uptime_seconds = 0;
+  double cpu_seconds = 0;
+  int64_t resident_bytes = 0;
+  int processors = 0;
+  int64_t models = 0;
+  int64_t bindings = 0;
+  int64_t sessions = 0;
+  int64_t participants = 0;
+  int64_t frames_sent = 0;
+  int64_t frame_bytes_sent = 0;
+  int64_t poses_accepted = 0;
+  int64_t poses_rejected = 0;
+};
+
 struct SchemeInfo {
   std::string scheme;
   std::string description;

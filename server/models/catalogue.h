@@ -152,6 +152,12 @@ class Catalogue {
     return result;
   }
 
+  // Of every tenant.
+  int64_t size() const {
+    MutexLock lock(mutex_);
+    return static_cast<int64_t>(entries_.size());
+  }
+
   // Every record of every tenant.
   std::vector<Pointer> All() const {
     std::vector<Pointer> all;

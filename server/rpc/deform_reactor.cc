@@ -126,9 +126,10 @@ void DeformReactor::HandleJoin(const v1::Join& join) {
 
 void DeformReactor::HandlePose(const v1::Pose& pose) {
   Participant& participant = *this->participant();
-  participant.Submit(pose.sequence(),
-                     FromProto(pose, participant.session().dimension()),
-                     pose.rig_changes());
+  const bool accepted = participant.Submit(
+      pose.sequence(), FromProto(pose, participant.session().dimension()),
+      pose.rig_changes());
+  streams_.counters_.CountPose(accepted);
   MutexLock lock(mutex_);
   ++poses_;
 }
@@ -197,7 +198,9 @@ void DeformReactor::StartNextWrite() {
 void DeformReactor::WriteChunk() {
   outgoing_ = FrameMessage(frame_->send, frame_->next_chunk++,
                            participant_->session().epoch());
-  if (frame_->next_chunk == frame_->send.frame->chunks.size()) {
+  const bool last = frame_->next_chunk == frame_->send.frame->chunks.size();
+  streams_.counters_.CountChunk(outgoing_.Length(), last);
+  if (last) {
     frame_.reset();
     ++frames_;
   }

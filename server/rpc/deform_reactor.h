@@ -14,6 +14,7 @@
 #include "grpcpp/server_context.h"
 #include "grpcpp/support/byte_buffer.h"
 #include "grpcpp/support/server_callback.h"
+#include "server/rpc/stream_counters.h"
 #include "server/sessions/session.h"
 #include "server/sessions/session_manager.h"
 
@@ -36,6 +37,7 @@ class DeformStreams {
   // Call it a few times a second.
   void CheckStalls();
   size_t size() const;
+  const StreamCounters& counters() const { return counters_; }
 
  private:
   friend class DeformReactor;
@@ -43,6 +45,7 @@ class DeformStreams {
 
   SessionManager& sessions_;
   const std::chrono::milliseconds stall_timeout_;
+  StreamCounters counters_;
   mutable Mutex mutex_;
   std::set<std::shared_ptr<DeformReactor>> reactors_ ABSL_GUARDED_BY(mutex_);
 };

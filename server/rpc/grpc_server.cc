@@ -16,6 +16,7 @@
 #include "server/rpc/calls.h"
 #include "server/rpc/deform_reactor.h"
 #include "server/rpc/model_service.h"
+#include "server/rpc/server_service.h"
 #include "server/rpc/session_service.h"
 
 namespace deform::server {
@@ -86,7 +87,8 @@ class GrpcServerImpl final : public GrpcServer {
         model_service_(calls_, rooms.models),
         binding_service_(calls_, rooms.bindings, rooms.sessions,
                          rooms.background),
-        session_service_(calls_, rooms.sessions, streams_) {}
+        session_service_(calls_, rooms.sessions, streams_),
+        server_service_(calls_, rooms, streams_) {}
 
   ~GrpcServerImpl() override {
     if (server_ != nullptr) Drain(std::chrono::milliseconds(0));
@@ -104,6 +106,7 @@ class GrpcServerImpl final : public GrpcServer {
     builder.RegisterService(&model_service_);
     builder.RegisterService(&binding_service_);
     builder.RegisterService(&session_service_);
+    builder.RegisterService(&server_service_);
     server_ = builder.BuildAndStart();
     if (server_ == nullptr || port == 0) {
       return MakeError(absl::StatusCode::kUnavailable,
@@ -162,6 +165,7 @@ class GrpcServerImpl final : public GrpcServer {
   ModelService model_service_;
   BindingService binding_service_;
   SessionService session_service_;
+  ServerService server_service_;
   std::unique_ptr<grpc::Server> server_;
   std::string address_;
 

@@ -319,25 +319,26 @@ void Session::PublishChange(Step& step) {
 
 Participant::~Participant() { Leave(); }
 
-void Participant::Submit(uint64_t sequence,
+bool Participant::Submit(uint64_t sequence,
                          const absl::StatusOr<PoseUpdate>& update,
                          uint64_t rig_changes) {
   Session& session = *session_;
   MutexLock lock(session.mutex_);
   const auto found = session.seats_.find(seat_);
-  if (found == session.seats_.end() || session.closed_) return;
+  if (found == session.seats_.end() || session.closed_) return false;
   Session::Seat& seat = found->second;
   const absl::StatusOr<PoseUpdate> checked =
       session.CheckPose(seat, sequence, update, rig_changes);
   if (!checked.ok()) {
     seat.outbox.Reject(sequence, checked.status());
-    return;
+    return false;
   }
   seat.last_sequence = sequence;
   seat.outbox.Expect(sequence);
   session.queue_.Push({.participant = seat_, .sequence = sequence}, *checked,
                       seat.outbox.delivery() == Delivery::kEvery);
   session.Schedule();
+  return true;
 }
 
 absl::StatusOr<PoseUpdate> Session::CheckPose(

@@ -76,8 +76,8 @@ class Participant {
   // over (PoseTransfer). Rejected are, beside an `update` that is a status,
   // what CheckPoseUpdate() and PoseTransfer refuse and InvalidArgument
   // SEQUENCE_NOT_RISING, RIG_CHANGED (too often), RIG_UNKNOWN (not yet so
-  // often). Needs WantsPoses().
-  void Submit(uint64_t sequence, const absl::StatusOr<PoseUpdate>& update,
+  // often). Needs WantsPoses(). True if it was accepted.
+  bool Submit(uint64_t sequence, const absl::StatusOr<PoseUpdate>& update,
               uint64_t rig_changes = 0);
   // False while as many of its poses or rejections wait as may. The receiver
   // is woken when that changes.

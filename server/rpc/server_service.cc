@@ -1,0 +1,39 @@
+#include "server/rpc/server_service.h"
+
+#include <thread>
+
+#include "server/rpc/process_usage.h"
+
+namespace deform::server {
+
+grpc::Status ServerService::GetServerStatus(
+    grpc::ServerContext* context, const v1::GetServerStatusRequest* /*request*/,
+    v1::GetServerStatusResponse* response) {
+  return calls_.Run("GetServerStatus", *context, [&]() -> absl::Status {
+    v1::ServerStatus& status = *response->mutable_status();
+    status.set_version(DEFORM_VERSION);
+    status.set_uptime_seconds(
+        std::chrono::duration<double>(rooms_.sessions.clock()() - start_)
+            .count());
+    const ProcessUsage usage = ReadProcessUsage();
+    status.set_cpu_seconds(usage.cpu_seconds);
+    status.set_resident_bytes(usage.resident_bytes);
+    status.set_processors(std::thread::hardware_concurrency());
+    status.set_models(rooms_.models.catalogue().size());
+    status.set_bindings(rooms_.bindings.catalogue().size());
+    status.set_sessions(rooms_.sessions.catalogue().size());
+    uint64_t participants = 0;
+    for (const auto& session : rooms_.sessions.catalogue().All()) {
+      participants += session->state().participants;
+    }
+    status.set_participants(participants);
+    const StreamCounters& counters = streams_.counters();
+    status.set_frames_sent(counters.frames());
+    status.set_frame_bytes_sent(counters.frame_bytes());
+    status.set_poses_accepted(counters.poses_accepted());
+    status.set_poses_rejected(counters.poses_rejected());
+    return absl::OkStatus();
+  });
+}
+
+}  // namespace deform::server

@@ -18,6 +18,7 @@
   X(Picture)               \
   X(Verify)                \
   X(Status)                \
+  X(Load)                  \
   X(Completion)            \
   X(Version)
 

@@ -1,0 +1,12 @@
+// A load run as a picture.
+#pragma once
+
+#include "client/load/load_run.h"
+#include "client/pictures/image.h"
+
+namespace deform::cli {
+
+// Percentiles of the latency over time, and below how often each latency came.
+Image DrawLoad(const LoadReport& report);
+
+}  // namespace deform::cli

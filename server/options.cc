@@ -19,6 +19,7 @@
 #include "absl/strings/str_split.h"
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
+#include "core/weights/compress_binding.h"
 
 namespace deform::server {
 namespace {
@@ -60,6 +61,12 @@ void VisitOptions(SomeOptions& o, Visitor&& visit) {
   visit("max-waiting-binds", o.max_waiting_binds, 1, 4096,
         "Calls that wait for a binding at a time. Each holds one of "
         "max-call-threads.");
+  visit("weight-tolerance", o.weight_tolerance, kFinestTolerance,
+        kCoarsestTolerance,
+        "How far compressed weights may move a point, as a fraction of the "
+        "rig's diagonal, for bindings whose request does not say: 1e-6 to "
+        "1e-2, or 0: weights stay dense. They are compressed in the background "
+        "and take about a tenth of the memory and of the time of a pose.");
   visit("max-sessions-memory", o.max_sessions_memory, 1, kMax,
         "Memory of all sessions: about 36 bytes per point.");
   visit("max-sessions", o.max_sessions, 1, kMax, "Sessions of all tenants.");
@@ -130,6 +137,11 @@ absl::Status Parse(absl::string_view name, const std::string& text,
   return Bad(name, absl::StrCat("is a number of seconds, not \"", text, "\""));
 }
 absl::Status Parse(absl::string_view name, const std::string& text,
+                   Tolerance& value) {
+  if (absl::SimpleAtod(text, &value.value)) return absl::OkStatus();
+  return Bad(name, absl::StrCat("is a number, not \"", text, "\""));
+}
+absl::Status Parse(absl::string_view name, const std::string& text,
                    Bytes& value) {
   const auto parsed = ParseBytes(text);
   if (!parsed.ok()) {
@@ -169,6 +181,13 @@ absl::Status Read(absl::string_view name, const toml::node& node,
   return absl::OkStatus();
 }
 absl::Status Read(absl::string_view name, const toml::node& node,
+                  Tolerance& value) {
+  const auto read = node.value<double>();
+  if (!read || !node.is_number()) return Bad(name, "is a number");
+  value.value = *read;
+  return absl::OkStatus();
+}
+absl::Status Read(absl::string_view name, const toml::node& node,
                   Bytes& value) {
   if (const auto number = node.value_exact<int64_t>()) {
     return Parse(name, absl::StrCat(*number), value);
@@ -183,6 +202,7 @@ std::string Format(bool value) { return value ? "true" : "false"; }
 std::string Format(int64_t value) { return absl::StrCat(value); }
 std::string Format(int value) { return absl::StrCat(value); }
 std::string Format(const Seconds& value) { return absl::StrCat(value.value); }
+std::string Format(const Tolerance& value) { return absl::StrCat(value.value); }
 std::string Format(const Bytes& value) {
   return absl::StrCat("\"", FormatExactly(value), "\"");
 }
@@ -191,6 +211,7 @@ std::string Format(const Bytes& value) {
 const char* TypeName(const std::string&) { return "TEXT"; }
 const char* TypeName(int64_t) { return "NUMBER"; }
 const char* TypeName(const Seconds&) { return "SECONDS"; }
+const char* TypeName(const Tolerance&) { return "FRACTION"; }
 const char* TypeName(const Bytes&) { return "BYTES"; }
 
 double NumberOf(int64_t value) { return static_cast<double>(value); }
@@ -204,6 +225,15 @@ absl::Status Check(absl::string_view name, const Value& value, double smallest,
   if (number >= smallest && number <= largest) return absl::OkStatus();
   return Bad(name, absl::StrCat("must be between ", smallest, " and ", largest,
                                 ", not ", number));
+}
+absl::Status Check(absl::string_view name, const Tolerance& tolerance,
+                   double smallest, double largest) {
+  const double value = tolerance.value;
+  if (value == 0 || (value >= smallest && value <= largest)) {
+    return absl::OkStatus();
+  }
+  return Bad(name, absl::StrCat("must be 0 or between ", smallest, " and ",
+                                largest, ", not ", value));
 }
 absl::Status Check(absl::string_view name, bool value, double, double) {
   if (value) return absl::OkStatus();

@@ -24,6 +24,11 @@ struct Seconds {
   }
 };
 
+// 0, or a fraction between the finest and the coarsest that the server takes.
+struct Tolerance {
+  double value = 0;
+};
+
 // What each means is said once, in options.cc, for --help and the file alike.
 struct Options {
   std::string listen = "127.0.0.1:7777";
@@ -41,6 +46,7 @@ struct Options {
   int64_t max_bindings = 10'000;
   int max_concurrent_binds = 2;
   int max_waiting_binds = 32;
+  Tolerance weight_tolerance{1e-5};
 
   Bytes max_sessions_memory{int64_t{4} << 30};
   int64_t max_sessions = 1'000;

@@ -15,6 +15,8 @@ namespace {
 
 // Binding yields to sessions.
 constexpr int kBackgroundNiceness = 10;
+// Compressing yields to all else: nobody waits for it.
+constexpr int kCompressionNiceness = 15;
 
 ModelRegistry::Limits ModelLimits(const Options& options) {
   return {.model_bytes = options.max_model_bytes.value,
@@ -27,6 +29,13 @@ BindingRegistry::Limits BindingLimits(const Options& options) {
           .count = options.max_bindings,
           .concurrent = options.max_concurrent_binds,
           .waiting_calls = options.max_waiting_binds};
+}
+
+Compressor::Options CompressionOptions(ThreadPool& pool) {
+  return {
+      .executor =
+          [&pool](std::function<void()> task) { pool.Submit(std::move(task)); },
+      .pool = &pool};
 }
 
 BatchScheduler::Options BatchOptions(ThreadPool& compute) {
@@ -57,8 +66,11 @@ struct Server::Parts {
                .niceness = kBackgroundNiceness}),
         background({.threads = options.compute_threads,
                     .niceness = kBackgroundNiceness}),
+        compressions({.threads = options.compute_threads,
+                      .niceness = kCompressionNiceness}),
         models(ModelLimits(options)),
-        bindings(models, binds, BindingLimits(options)),
+        bindings(models, binds, BindingLimits(options), &Bind,
+                 CompressionOptions(compressions)),
         scheduler(BatchOptions(*compute)),
         sessions(bindings,
                  {.memory = options.max_sessions_memory.value,
@@ -75,6 +87,7 @@ struct Server::Parts {
   std::unique_ptr<ThreadPool> compute;  // Deforming and encoding.
   ThreadPool binds;                     // Weights.
   ThreadPool background;  // Weights again, for those who ask to see them.
+  ThreadPool compressions;
   ModelRegistry models;
   BindingRegistry bindings;
   BatchScheduler scheduler;
@@ -88,7 +101,8 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Options& options) {
       parts->grpc,
       GrpcServer::Start({.listen = options.listen,
                          .max_call_threads = options.max_call_threads,
-                         .stall_timeout = options.stall_timeout.milliseconds()},
+                         .stall_timeout = options.stall_timeout.milliseconds(),
+                         .weight_tolerance = options.weight_tolerance.value},
                         {.models = parts->models,
                          .bindings = parts->bindings,
                          .sessions = parts->sessions,

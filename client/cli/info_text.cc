@@ -37,6 +37,25 @@ std::string FirstOf(const std::vector<int64_t>& numbers, size_t count) {
   return text;
 }
 
+// "compressed 9.8 times from 215 MiB; within 7.1e-06 of the diagonal".
+std::string FormOf(const BindingInfo& binding) {
+  std::string text = WeightFormText(binding.weight_form);
+  if (binding.weight_form == WeightForm::kCompressed) {
+    absl::StrAppendFormat(
+        &text, " %.3g times from %s; within %.2g of the diagonal",
+        binding.compression_ratio, Bytes(binding.dense_weight_bytes),
+        binding.weight_error_bound);
+  } else if (binding.weight_form == WeightForm::kCompressing) {
+    absl::StrAppendFormat(&text, " to %.2g of the diagonal, %s of %s points",
+                          binding.weight_tolerance,
+                          Thousands(binding.points_done),
+                          Thousands(binding.points_total));
+  } else if (!binding.why_dense.empty()) {
+    absl::StrAppend(&text, ": ", binding.why_dense);
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string TimeText(WallTime time) {
@@ -53,6 +72,20 @@ std::string WeightStateText(WeightState state) {
     case WeightState::kComputing:
       return "computing";
     case WeightState::kUnknown:
+      break;
+  }
+  return "unknown";
+}
+
+std::string WeightFormText(WeightForm form) {
+  switch (form) {
+    case WeightForm::kDense:
+      return "dense";
+    case WeightForm::kCompressing:
+      return "compressing";
+    case WeightForm::kCompressed:
+      return "compressed";
+    case WeightForm::kUnknown:
       break;
   }
   return "unknown";
@@ -105,6 +138,12 @@ Json ToJson(const BindingInfo& binding) {
           {"rig_diagonal", binding.rig_diagonal},
           {"weight_bytes", binding.weight_bytes},
           {"weight_state", WeightStateText(binding.weight_state)},
+          {"weight_form", WeightFormText(binding.weight_form)},
+          {"weight_tolerance", binding.weight_tolerance},
+          {"weight_error_bound", binding.weight_error_bound},
+          {"dense_weight_bytes", binding.dense_weight_bytes},
+          {"compression_ratio", binding.compression_ratio},
+          {"why_dense", binding.why_dense},
           {"points_done", binding.points_done},
           {"points_total", binding.points_total},
           {"weight_users", binding.weight_users},
@@ -227,6 +266,7 @@ void Describe(const BindingInfo& binding, std::ostream& out) {
   properties.Add("weights", absl::StrFormat("%s, computed in %s",
                                             Bytes(binding.weight_bytes),
                                             Seconds(binding.compute_seconds)));
+  properties.Add("form", FormOf(binding));
   properties.Add("kept", KeptText(binding));
   DescribeQuality(binding.quality, properties);
   DescribePoints(binding, properties);

@@ -23,5 +23,6 @@ void Describe(const SessionInfo& session, std::ostream& out);
 std::string TimeText(WallTime time);
 // "resident"
 std::string WeightStateText(WeightState state);
+std::string WeightFormText(WeightForm form);
 
 }  // namespace deform::cli

@@ -117,6 +117,12 @@ void RigOptions::AddTo(CLI::App& app, bool both) {
   group->add_option("--lambda", lambda,
                     "s_cc: the paper's lambda > 1; it has no effect");
   group
+      ->add_option("--weight-tolerance", weight_tolerance,
+                   "How far compressed weights may move a point, as a fraction "
+                   "of the rig's diagonal: 1e-6 to 1e-2, or 0 for dense ones; "
+                   "by default the server's")
+      ->type_name("FRACTION");
+  group
       ->add_option("--dimension", dimension,
                    "2 or 3; by default 2 if the files are flat")
       ->check(CLI::IsMember({2, 3}))
@@ -179,6 +185,7 @@ absl::StatusOr<BindingSpec> LoadSpec(const RigOptions& options, int dimension) {
                 : caged                 ? "green"
                                         : "s_cc";
   spec.options.lambda = options.lambda;
+  spec.weight_tolerance = options.weight_tolerance;
   spec.unbindable =
       options.unbindable == "report" ? Unbindable::kReport : Unbindable::kFail;
   spec.flip_inside_out = options.flip_cage;

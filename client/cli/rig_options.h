@@ -1,6 +1,7 @@
 // Options that say how a model is bound, shared by bind, deform and play.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -24,6 +25,7 @@ struct RigOptions {
   bool add_box = false;
   std::string handle_weights;
   double lambda = 0;
+  std::optional<double> weight_tolerance;
   int dimension = 0;  // 0: as the files say.
 
   // `both`: a cage and handles may be given together.

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -75,6 +76,10 @@ struct BindingSpec {
   bool add_box_handles = false;
   // Points that stay at rest whatever the pose.
   std::vector<int64_t> clamped;
+  // How far compressed weights may move a point, as a fraction of D, as
+  // CreateBindingRequest tells: 1e-6 to 1e-2; 0: dense. The server's if not
+  // set.
+  std::optional<double> weight_tolerance;
 };
 
 }  // namespace deform

@@ -156,6 +156,19 @@ WeightState FromProto(v1::WeightState state) {
   }
 }
 
+WeightForm FromProto(v1::WeightForm form) {
+  switch (form) {
+    case v1::WEIGHT_FORM_DENSE:
+      return WeightForm::kDense;
+    case v1::WEIGHT_FORM_COMPRESSING:
+      return WeightForm::kCompressing;
+    case v1::WEIGHT_FORM_COMPRESSED:
+      return WeightForm::kCompressed;
+    default:
+      return WeightForm::kUnknown;
+  }
+}
+
 }  // namespace
 
 ModelInfo FromProto(const v1::Model& model) {
@@ -217,6 +230,12 @@ BindingInfo FromProto(const v1::Binding& binding) {
       .rig_diagonal = binding.rig_diagonal(),
       .weight_bytes = static_cast<int64_t>(binding.weight_bytes()),
       .weight_state = FromProto(binding.weight_state()),
+      .weight_form = FromProto(binding.weight_form()),
+      .weight_tolerance = binding.weight_tolerance(),
+      .weight_error_bound = binding.weight_error_bound(),
+      .dense_weight_bytes = static_cast<int64_t>(binding.dense_weight_bytes()),
+      .compression_ratio = binding.compression_ratio(),
+      .why_dense = binding.why_dense(),
       .points_done = static_cast<int64_t>(binding.progress().points_done()),
       .points_total = static_cast<int64_t>(binding.progress().points_total()),
       .weight_users = static_cast<int>(binding.weight_users()),
@@ -397,6 +416,9 @@ v1::CreateBindingRequest ToProto(const BindingSpec& spec,
   request.set_add_box_handles(spec.add_box_handles);
   request.mutable_clamped_points()->Add(spec.clamped.begin(),
                                         spec.clamped.end());
+  if (spec.weight_tolerance) {
+    request.set_weight_tolerance(*spec.weight_tolerance);
+  }
   return request;
 }
 

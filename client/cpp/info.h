@@ -48,6 +48,9 @@ struct ExitPartInfo {
 // somebody needs them.
 enum class WeightState { kUnknown, kResident, kEvicted, kComputing };
 
+// kCompressing: dense, and being compressed or waiting for that.
+enum class WeightForm { kUnknown, kDense, kCompressing, kCompressed };
+
 struct BindingInfo {
   std::string binding_id;  // Content address.
   std::string model_id;
@@ -59,7 +62,15 @@ struct BindingInfo {
   double rig_diagonal = 0;   // D, model units.
   int64_t weight_bytes = 0;  // Memory of the weights while they are resident.
   WeightState weight_state = WeightState::kUnknown;
-  // Of kComputing.
+  WeightForm weight_form = WeightForm::kUnknown;
+  double weight_tolerance = 0;  // As asked; 0: dense.
+  // Of compressed weights: no point of the model is farther off than this times
+  // the pose's largest displacement, in units of D.
+  double weight_error_bound = 0;
+  int64_t dense_weight_bytes = 0;  // If they were dense.
+  double compression_ratio = 0;    // That by weight_bytes.
+  std::string why_dense;           // In spite of the tolerance.
+  // Of kComputing, or else of kCompressing.
   int64_t points_done = 0;
   int64_t points_total = 0;
   int weight_users = 0;  // Sessions and calls; they keep the weights resident.

@@ -70,6 +70,7 @@ class Run {
     spec.rig = golden_.rig;
     spec.options = golden_.options;
     spec.unbindable = Unbindable::kReport;
+    spec.weight_tolerance = 0;  // What is expected is finer.
     DEFORM_ASSIGN_OR_RETURN(const BindingInfo binding,
                             client_.CreateBinding(spec));
     created_.Add(binding);

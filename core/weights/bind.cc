@@ -402,18 +402,6 @@ void Binder::Finish() {
   parts_.quality = figures_.tally.quality();
 }
 
-absl::Status CheckTolerance(double tolerance) {
-  if (tolerance == 0 ||
-      (tolerance >= kFinestTolerance && tolerance <= kCoarsestTolerance)) {
-    return absl::OkStatus();
-  }
-  return InvalidInput(
-      "WEIGHT_TOLERANCE_OUT_OF_RANGE", "weight_tolerance",
-      absl::StrCat("weight tolerance must be 0 (dense weights) or in [",
-                   kFinestTolerance, ", ", kCoarsestTolerance, "], not ",
-                   tolerance));
-}
-
 absl::Status CheckClamped(const BindRequest& request) {
   const std::vector<int64_t>& clamped = request.clamped;
   const int64_t points = request.model->size();
@@ -428,7 +416,7 @@ absl::Status CheckClamped(const BindRequest& request) {
 }
 
 absl::Status CheckFits(const BindRequest& request) {
-  DEFORM_RETURN_IF_ERROR(CheckTolerance(request.weight_tolerance));
+  DEFORM_RETURN_IF_ERROR(CheckWeightTolerance(request.weight_tolerance));
   DEFORM_RETURN_IF_ERROR(CheckClamped(request));
   DEFORM_RETURN_IF_ERROR(
       CheckSameDimension(*request.model, DimensionOf(request.rig)));
@@ -472,7 +460,9 @@ absl::StatusOr<std::shared_ptr<const Binding>> Bind(
   parts.compute_seconds = SecondsSince(start);
   BindingFacts facts(std::move(parts));
   if (!dense) {
-    return CompressBinding(facts, nullptr, request.weight_tolerance, control,
+    BindControl rest = control;
+    rest.points_done = nullptr;  // They have been counted.
+    return CompressBinding(facts, nullptr, request.weight_tolerance, rest,
                            binder.solutions());
   }
   return std::make_shared<const Binding>(std::move(facts), std::move(weights),

@@ -49,6 +49,8 @@ struct BindControl {
   // Solutions of another binding of the model by the same scheme: where the
   // searches start.
   const Solutions* known = nullptr;
+  // Compressed weights that take more are given up; 0: no limit.
+  int64_t max_weight_bytes = 0;
 };
 
 // What is known of a binding beside its weights: small, and enough to compute
@@ -159,7 +161,7 @@ class Binding : public BindingFacts {
 //   FailedPrecondition EXTERIOR_NO_EXIT_FACE, EXIT_AMBIGUOUS, OUTSIDE_HULL,
 //     NOT_CONVERGED, WEIGHT_TOO_LARGE (for float) with Unbindable::kFail: says
 //     how many, names the first ten
-//   Cancelled
+//   ResourceExhausted NOT_SMALLER; Cancelled
 absl::StatusOr<std::shared_ptr<const Binding>> Bind(const BindRequest& request,
                                                     const BindControl& control);
 

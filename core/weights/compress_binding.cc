@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
+#include "core/base/error.h"
 #include "core/base/status_macros.h"
 #include "core/weights/blocks.h"
 #include "core/weights/compress_weights.h"
@@ -94,12 +96,26 @@ absl::StatusOr<std::shared_ptr<const Binding>> CompressBinding(
       }};
   DEFORM_ASSIGN_OR_RETURN(
       CompressedWeights weights,
-      CompressWeights(
-          source, tolerance,
-          {.pool = control.pool, .cancellation = control.cancellation}));
+      CompressWeights(source, tolerance,
+                      {.pool = control.pool,
+                       .cancellation = control.cancellation,
+                       .points_done = control.points_done,
+                       .max_bytes = control.max_weight_bytes}));
   return std::make_shared<const Binding>(
       facts, std::make_shared<const CompressedWeights>(std::move(weights)),
       std::move(solutions));
+}
+
+absl::Status CheckWeightTolerance(double tolerance) {
+  if (tolerance == 0 ||
+      (tolerance >= kFinestTolerance && tolerance <= kCoarsestTolerance)) {
+    return absl::OkStatus();
+  }
+  return InvalidInput(
+      "WEIGHT_TOLERANCE_OUT_OF_RANGE", "weight_tolerance",
+      absl::StrCat("weight tolerance must be 0 (dense weights) or in [",
+                   kFinestTolerance, ", ", kCoarsestTolerance, "], not ",
+                   tolerance));
 }
 
 bool WorthCompressing(int64_t dense_bytes) {

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "core/weights/binding.h"
 
@@ -23,11 +24,16 @@ std::vector<double> PoseBounds(const BindingFacts& facts);
 // a fraction of D for poses that move vertices by up to D and scaled normals by
 // up to 2, after the best similarity is taken out. See CompressWeights(). From
 // the dense weights of `facts`, or, if null, computed again cluster by cluster.
-// `solutions` go along as they are. Cancelled.
+// `solutions` go along as they are. The bound may come out larger than the
+// tolerance where float sums cannot keep it. Cancelled, NOT_SMALLER (see
+// BindControl::max_weight_bytes).
 absl::StatusOr<std::shared_ptr<const Binding>> CompressBinding(
     const BindingFacts& facts, const WeightTiles* dense, double tolerance,
     const BindControl& control,
     std::shared_ptr<const Solutions> solutions = nullptr);
+
+// InvalidArgument WEIGHT_TOLERANCE_OUT_OF_RANGE; 0 is dense.
+absl::Status CheckWeightTolerance(double tolerance);
 
 // Dense weights that lie in the processor's caches anyway gain nothing.
 bool WorthCompressing(int64_t dense_bytes);

@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "absl/functional/function_ref.h"
+#include "absl/strings/str_cat.h"
+#include "core/base/error.h"
 #include "core/kernels/multiply_tiles.h"
 #include "core/weights/leaf_fit.h"
 #include "core/weights/point_clusters.h"
@@ -41,6 +43,11 @@ int64_t PartsOf(int64_t points, int64_t size) {
   return std::max<int64_t>(1, (points + size / 2) / size);
 }
 
+int64_t ClusterPoints(int64_t columns) {
+  return std::clamp(kClusterNumbers / std::max<int64_t>(1, columns),
+                    kBlockPoints, kClusterPoints);
+}
+
 // A cluster's points, and how they are grouped further. Ranges of the order.
 struct ClusterPlan {
   struct Branch {
@@ -57,11 +64,9 @@ std::vector<ClusterPlan> PlanClusters(const Positions& points, int64_t columns,
     return CutIntoClusters(points, PartsOf(range.count, size), kBlockPoints,
                            range, order);
   };
-  const int64_t cluster_points =
-      std::clamp(kClusterNumbers / std::max<int64_t>(1, columns), kBlockPoints,
-                 kClusterPoints);
   std::vector<ClusterPlan> plans;
-  for (const Block range : cut({0, std::ssize(order)}, cluster_points)) {
+  for (const Block range :
+       cut({0, std::ssize(order)}, ClusterPoints(columns))) {
     ClusterPlan plan{.range = range};
     for (const Block branch : cut(range, kBranchPoints)) {
       plan.branches.push_back({branch, cut(branch, kLeafPoints)});
@@ -131,6 +136,16 @@ struct CompressedCluster {
   WeightTiles basis;
   std::vector<CompressedWeights::Branch> branches;
   double bound = 0;
+
+  // Of what is kept, about.
+  int64_t bytes() const {
+    int64_t sum = basis.bytes();
+    for (const CompressedWeights::Branch& branch : branches) {
+      sum += branch.basis.bytes() + branch.leaf_rows.bytes() +
+             static_cast<int64_t>(branch.numbers.size());
+    }
+    return sum;
+  }
 };
 
 CompressedWeights::Branch MakeBranch(const ClusterPlan::Branch& plan,
@@ -356,7 +371,24 @@ std::vector<int32_t> PointsWithWeights(const WeightSource& source) {
   return points;
 }
 
+absl::Status NotSmaller(int64_t max_bytes) {
+  return MakeError(absl::StatusCode::kResourceExhausted,
+                   absl::StrCat("compressed weights would take more than ",
+                                max_bytes, " bytes"),
+                   {.reason = "NOT_SMALLER", .field = "weight_tolerance"});
+}
+
 }  // namespace
+
+int64_t CompressionBytes(int64_t points, int64_t columns, int threads) {
+  const int64_t cluster = ClusterPoints(columns);
+  const int64_t at_work = std::min<int64_t>(threads, PartsOf(points, cluster));
+  // A cluster is up to half as large again as it should be. Its rows as float,
+  // as double, and as the coefficients of two levels.
+  const int64_t rows = std::min(points, cluster + cluster / 2);
+  constexpr int64_t kBytes = sizeof(float) + 3 * sizeof(double);
+  return at_work * rows * columns * kBytes;
+}
 
 absl::StatusOr<CompressedWeights> CompressWeights(
     const WeightSource& source, double tolerance,
@@ -366,11 +398,21 @@ absl::StatusOr<CompressedWeights> CompressWeights(
   const std::vector<ClusterPlan> plans =
       PlanClusters(*source.points, columns, order);
   std::vector<CompressedCluster> clusters(plans.size());
+  std::atomic<int64_t> bytes = 0;
+  const auto too_large = [&] {
+    return control.max_bytes > 0 && bytes > control.max_bytes;
+  };
   const bool finished = RunAll(std::ssize(plans), control, [&](int64_t k) {
+    if (too_large()) return;
     clusters[k] =
         ClusterCompressor(source, tolerance, plans[k], order).Compress();
+    bytes += clusters[k].bytes();
+    if (control.points_done != nullptr) {
+      *control.points_done += plans[k].range.count;
+    }
   });
   if (!finished) return absl::CancelledError("compression was cancelled");
+  if (too_large()) return NotSmaller(control.max_bytes);
   CompressedWeights::Parts parts{.columns = columns, .tolerance = tolerance};
   parts.slots.assign(source.points->rows(), -1);
   for (size_t slot = 0; slot < order.size(); ++slot) {

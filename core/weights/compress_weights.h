@@ -1,6 +1,7 @@
 // Making compressed weights, cluster by cluster.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -30,14 +31,22 @@ struct WeightSource {
 struct CompressControl {
   ThreadPool* pool = nullptr;  // These may be null.
   const Cancellation* cancellation = nullptr;
+  std::atomic<int64_t>* points_done = nullptr;  // Only rises.
+  int64_t max_bytes = 0;  // Give up when they take more; 0: no limit.
 };
+
+// What is needed beside the weights to compress them, at most, with so many
+// threads at work.
+int64_t CompressionBytes(int64_t points, int64_t columns, int threads);
 
 // Weights that reproduce `source` so that for every pose
 //
 //   |error of a point| <= bound() x max over c of |x_c| / R_c
 //
 // with bound() <= tolerance > 0, unless half of that is not enough for the
-// rounding of float sums: about 1e-6 where rows sum to about 1. The same whatever the number of threads. Cancelled.
+// rounding of float sums: about 1e-6 where rows sum to about 1. The same
+// whatever the number of threads. Cancelled; ResourceExhausted NOT_SMALLER
+// beyond `max_bytes`.
 //
 // Clusters of about 10^4 points get a basis by pivoted Gram-Schmidt over some
 // of their rows, extended by the rows it misses most; branches and leaves turn

@@ -9,6 +9,7 @@
 #include "core/base/status_macros.h"
 #include "server/models/content_id.h"
 #include "server/models/process_memory.h"
+#include "server/models/retry.h"
 
 namespace deform::server {
 namespace {
@@ -29,19 +30,21 @@ std::string BindingId(const BindSpec& spec) {
   hash.Add(std::span<const int32_t>(spec.exits.face_of_point));
   hash.Add(static_cast<int64_t>(spec.unbindable));
   hash.Add(std::span<const int64_t>(spec.clamped));
+  hash.Add(spec.weight_tolerance + 0.0);  // -0 is 0.
   return "b-" + hash.Finish();
 }
 
-// What the weights of a binding will take, with the solutions that schemes of
-// handles keep.
-int64_t WeightBytes(const Rig& rig, const CoordinateScheme& scheme,
-                    int64_t points) {
-  int64_t columns = RestVertices(rig).rows();
+int64_t ColumnsOf(const Rig& rig, const CoordinateScheme& scheme) {
   const Cage* cage = std::get_if<Cage>(&rig);
-  if (cage != nullptr && scheme.uses_normals()) columns += cage->face_count();
-  const int64_t solutions =
-      cage == nullptr ? 3 * points * int64_t{sizeof(float)} : 0;
-  return WeightTiles::BytesFor(points, columns) + solutions;
+  return RestVertices(rig).rows() +
+         (cage != nullptr && scheme.uses_normals() ? cage->face_count() : 0);
+}
+
+// What schemes of handles keep beside the weights.
+int64_t SolutionBytes(const Rig& rig, int64_t points) {
+  return std::holds_alternative<Cage>(rig)
+             ? 0
+             : 3 * points * int64_t{sizeof(float)};
 }
 
 // What will be known beside them, at worst: the request, and all points twice
@@ -58,7 +61,20 @@ int64_t FactBytes(const BindRequest& request) {
          indices * int64_t{sizeof(int32_t)};
 }
 
+absl::Status NeitherFormFits(absl::string_view why) {
+  return MakeError(
+      absl::StatusCode::kResourceExhausted,
+      absl::StrCat("dense weights do not fit into max-bindings-memory, and ",
+                   why),
+      {.reason = "MEMORY_LIMIT", .field = "max-bindings-memory"});
+}
+
 }  // namespace
+
+int64_t DenseWeightBytes(const BindingFacts& facts) {
+  return WeightTiles::BytesFor(facts.point_count(), facts.column_count()) +
+         SolutionBytes(facts.rig(), facts.point_count());
+}
 
 // One computation, owned by whoever waits for it or runs it.
 struct BindingRegistry::Job {
@@ -68,12 +84,17 @@ struct BindingRegistry::Job {
   explicit Job(const std::shared_ptr<const BindingRecord>& record)
       : key(record->tenant, record->id),
         request(record, &record->facts.request()),
+        weight_tolerance(record->weight_tolerance),
         known(record) {}
 
   const Key key;
   const std::shared_ptr<const BindRequest> request;
+  double weight_tolerance = 0;
   // Whose weights are computed again; null for a new binding.
   const std::shared_ptr<const BindingRecord> known;
+  // If dense weights do not fit: what those that are made without them may
+  // take. Else 0.
+  int64_t max_compressed_bytes = 0;
   int64_t points_total = 0;
   std::atomic<int64_t> points_done{0};
   Cancellation cancellation;
@@ -87,13 +108,15 @@ struct BindingRegistry::Job {
 };
 
 BindingRegistry::BindingRegistry(ModelRegistry& models, ThreadPool& pool,
-                                 const Limits& limits, BindFunction bind)
+                                 const Limits& limits, BindFunction bind,
+                                 Compressor::Options compression)
     : limits_(limits),
       bind_(std::move(bind)),
       models_(models),
       pool_(pool),
       weights_(limits.memory, "max-bindings-memory"),
-      bindings_("binding", limits.count, "max-bindings") {}
+      bindings_("binding", limits.count, "max-bindings"),
+      compressor_(weights_.budget(), std::move(compression)) {}
 
 BindingRegistry::~BindingRegistry() {
   MutexLock lock(mutex_);
@@ -119,12 +142,12 @@ absl::StatusOr<std::unique_ptr<BindingRegistry::Waiter>> BindingRegistry::Join(
   // the first can be found by the second.
   MutexLock lock(mutex_);
   if (waiting_ >= limits_.waiting_calls) {
-    return MakeError(
+    return RetryLater(MakeError(
         absl::StatusCode::kResourceExhausted,
         absl::StrCat(waiting_,
                      " calls wait for bindings (max-waiting-binds): try again "
                      "later"),
-        {.reason = "TOO_MANY_BINDS", .field = "max-waiting-binds"});
+        {.reason = "TOO_MANY_BINDS", .field = "max-waiting-binds"}));
   }
   std::shared_ptr<Job> job;
   const auto shared = jobs_.find(key);
@@ -162,12 +185,31 @@ absl::StatusOr<std::shared_ptr<BindingRegistry::Job>> BindingRegistry::MakeJob(
   job->points_total = job->request->model->size();
   job->model = std::move(model);
   job->known_solutions = std::move(spec.known);
-  DEFORM_ASSIGN_OR_RETURN(
-      job->memory, budget().Reserve(WeightBytes(job->request->rig, *scheme,
-                                                job->points_total) +
-                                        FactBytes(*job->request),
-                                    "the binding needs"));
+  job->weight_tolerance = spec.weight_tolerance;
+  DEFORM_RETURN_IF_ERROR(Reserve(*job, *scheme, "the binding needs"));
   return job;
+}
+
+absl::Status BindingRegistry::Reserve(Job& job, const CoordinateScheme& scheme,
+                                      absl::string_view what) {
+  const int64_t columns = ColumnsOf(job.request->rig, scheme);
+  const int64_t dense = WeightTiles::BytesFor(job.points_total, columns);
+  const int64_t others = SolutionBytes(job.request->rig, job.points_total) +
+                         FactBytes(*job.request);
+  auto memory = budget().Reserve(dense + others, what);
+  if (!memory.ok() && job.weight_tolerance > 0 && compressor_.IsWorth(dense)) {
+    const int64_t largest = dense / kLeastRatioAtOnce;
+    auto less = budget().Reserve(
+        compressor_.WorkingBytes(job.points_total, columns) + largest + others,
+        what);
+    if (less.ok()) {
+      job.max_compressed_bytes = largest;
+      memory = std::move(less);
+    }
+  }
+  DEFORM_RETURN_IF_ERROR(memory.status());
+  job.memory = *std::move(memory);
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::shared_ptr<BindingRegistry::Job>>
@@ -180,12 +222,9 @@ BindingRegistry::MakeJobFor(const std::shared_ptr<const BindingRecord>& known) {
     job->outcome = CreatedBinding{known, std::move(binding), true};
     return job;
   }
-  DEFORM_ASSIGN_OR_RETURN(
-      job->memory,
-      budget().Reserve(
-          WeightBytes(facts.rig(), facts.scheme(), facts.point_count()) +
-              FactBytes(facts.request()),
-          "the weights of the binding, evicted since nobody used them, need"));
+  DEFORM_RETURN_IF_ERROR(Reserve(
+      *job, facts.scheme(),
+      "the weights of the binding, evicted since nobody used them, need"));
   return job;
 }
 
@@ -222,6 +261,7 @@ absl::Status BindingRegistry::Remove(const std::string& tenant,
     std::shared_ptr<const BindingRecord> removed;  // Outlives the lock.
     MutexLock lock(mutex_);
     DEFORM_ASSIGN_OR_RETURN(removed, bindings_.Remove(tenant, id));
+    compressor_.Cancel(*removed);
     // Who waits for weights of a binding that is gone still gets them; who
     // creates it again gets a new one.
     jobs_.erase(Key(tenant, id));
@@ -250,6 +290,7 @@ void BindingRegistry::StartJobs() {
 
 void BindingRegistry::Run(std::shared_ptr<Job> job) {
   absl::StatusOr<CreatedBinding> outcome = Compute(*job);
+  if (outcome.ok()) compressor_.Add(outcome->record);
   MutexLock lock(mutex_);
   job->outcome = std::move(outcome);
   Forget(job);
@@ -266,12 +307,7 @@ absl::StatusOr<CreatedBinding> BindingRegistry::Compute(Job& job) try {
   auto model = std::move(job.model);
   auto memory = std::move(job.memory);
   if (job.cancellation.cancelled()) return absl::CancelledError();
-  DEFORM_ASSIGN_OR_RETURN(
-      const auto computed,
-      bind_(*job.request, {.pool = &pool_,
-                           .cancellation = &job.cancellation,
-                           .points_done = &job.points_done,
-                           .known = job.known_solutions.get()}));
+  DEFORM_ASSIGN_OR_RETURN(const auto computed, ComputeWeights(job));
   auto weights = memory.Split(computed->weight_bytes());
   if (job.known != nullptr) {
     // The facts stay the record's: one copy, and figures that do not change.
@@ -286,6 +322,7 @@ absl::StatusOr<CreatedBinding> BindingRegistry::Compute(Job& job) try {
       BindingRecord{.tenant = job.key.first,
                     .id = job.key.second,
                     .model_id = model.record()->id,
+                    .weight_tolerance = job.weight_tolerance,
                     .facts = *computed,
                     .weights = weights_.MakeSlot(),
                     .create_time = absl::Now(),
@@ -300,6 +337,31 @@ absl::StatusOr<CreatedBinding> BindingRegistry::Compute(Job& job) try {
   return MakeError(absl::StatusCode::kResourceExhausted,
                    "the machine has no memory left for the computation",
                    {.reason = "OUT_OF_MEMORY", .field = "memory"});
+}
+
+absl::StatusOr<std::shared_ptr<const Binding>> BindingRegistry::ComputeWeights(
+    Job& job) const {
+  BindRequest request = *job.request;
+  request.weight_tolerance =
+      job.max_compressed_bytes > 0 ? job.weight_tolerance : 0;
+  auto computed =
+      bind_(request, {.pool = &pool_,
+                      .cancellation = &job.cancellation,
+                      .points_done = &job.points_done,
+                      .known = job.known_solutions.get(),
+                      .max_weight_bytes = job.max_compressed_bytes});
+  if (job.max_compressed_bytes == 0) return computed;
+  if (DetailOf(computed.status()).reason == "NOT_SMALLER") {
+    return NeitherFormFits(absl::StrCat(
+        "compressed to a tolerance of ", job.weight_tolerance,
+        " they would take more than ", FormatBytes(job.max_compressed_bytes)));
+  }
+  DEFORM_RETURN_IF_ERROR(computed.status());
+  const double bound = (*computed)->compressed()->bound();
+  if (bound <= job.weight_tolerance) return computed;
+  return NeitherFormFits(
+      absl::StrCat("compressed, sums in float keep them within ", bound,
+                   ", not ", job.weight_tolerance));
 }
 
 void BindingRegistry::Abandon(const std::shared_ptr<Job>& job) {

@@ -21,7 +21,9 @@
 #include "core/base/mutex.h"
 #include "core/base/thread_pool.h"
 #include "core/weights/binding.h"
+#include "server/models/binding_record.h"
 #include "server/models/catalogue.h"
+#include "server/models/compressor.h"
 #include "server/models/memory_budget.h"
 #include "server/models/model_registry.h"
 #include "server/models/weights_cache.h"
@@ -38,28 +40,17 @@ struct BindSpec {
   ExitRegions exits;
   Unbindable unbindable = Unbindable::kFail;
   std::vector<int64_t> clamped;  // Sorted, each once.
+  // The weights are compressed to this (compress_binding.h); 0: they are dense.
+  double weight_tolerance = 0;
   // Where the search for the weights starts (BindControl); no part of what is
   // asked for.
   std::shared_ptr<const Solutions> known;
 };
 
-struct BindingRecord {
-  std::string tenant;
-  std::string id;  // Content address of the whole BindSpec.
-  std::string model_id;
-  BindingFacts facts;
-  std::shared_ptr<WeightsCache::Slot> weights;  // Where they are, if they are.
-  absl::Time create_time;
-  MemoryBudget::Reservation memory;  // Of the facts.
-  ModelCatalogue::Lease model;       // The model stays while its binding does.
-};
+// What the weights take if they are dense, with what solvers keep beside them.
+int64_t DenseWeightBytes(const BindingFacts& facts);
 
 using BindingCatalogue = Catalogue<const BindingRecord>;
-
-struct BindProgress {
-  int64_t points_done = 0;
-  int64_t points_total = 0;
-};
 
 // A binding whose weights are here, and stay while this lives.
 struct CreatedBinding {
@@ -118,7 +109,8 @@ class BindingRegistry {
   // Computes on `pool`. Models and pool are borrowed. `bind` is a parameter for
   // tests.
   BindingRegistry(ModelRegistry& models, ThreadPool& pool, const Limits& limits,
-                  BindFunction bind = &Bind);
+                  BindFunction bind = &Bind,
+                  Compressor::Options compression = {});
   // Cancels what is being computed and waits for it.
   ~BindingRegistry();
 
@@ -145,6 +137,8 @@ class BindingRegistry {
   // Set while the weights of this binding are being computed again.
   std::optional<BindProgress> ProgressOf(const BindingRecord& record);
 
+  // Replaces dense weights by compressed ones where that was asked for.
+  Compressor& compressor() { return compressor_; }
   ModelRegistry& models() { return models_; }
   MemoryBudget& budget() { return weights_.budget(); }
   // To look things up; Use() and Remove() are here.
@@ -161,6 +155,10 @@ class BindingRegistry {
   absl::StatusOr<std::shared_ptr<Job>> MakeJobFor(
       const std::shared_ptr<const BindingRecord>& known);
   absl::StatusOr<std::shared_ptr<Job>> MakeJob(const Key& key, BindSpec spec);
+  // Reserves for dense weights or, if these do not fit, for compressed ones
+  // that are made without them.
+  absl::Status Reserve(Job& job, const CoordinateScheme& scheme,
+                       absl::string_view what);
   void StartJobs() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Abandon(const std::shared_ptr<Job>& job)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -168,6 +166,7 @@ class BindingRegistry {
   void Forget(const std::shared_ptr<Job>& job)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::StatusOr<CreatedBinding> Compute(Job& job);
+  absl::StatusOr<std::shared_ptr<const Binding>> ComputeWeights(Job& job) const;
 
   const Limits limits_;
   const BindFunction bind_;
@@ -175,6 +174,7 @@ class BindingRegistry {
   ThreadPool& pool_;
   WeightsCache weights_;
   BindingCatalogue bindings_;
+  Compressor compressor_;
 
   Mutex mutex_;
   CondVar changed_;

@@ -6,6 +6,7 @@
 #include "absl/strings/str_format.h"
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
+#include "server/models/retry.h"
 
 namespace deform::server {
 
@@ -53,13 +54,14 @@ absl::Status MemoryBudget::Take(int64_t bytes, absl::string_view what) {
     if (missing == 0) return absl::OkStatus();
     const int64_t reclaimable = reclaim_ ? reclaim_(missing) : 0;
     if (reclaimable >= missing) continue;  // Unless others were quicker.
-    return MakeError(
-        absl::StatusCode::kResourceExhausted,
-        absl::StrCat(what, " ", FormatBytes(bytes), "; ",
-                     FormatBytes(used() - reclaimable), " of ",
-                     FormatBytes(limit_), " (", option_,
-                     ") are in use: delete what is no longer needed"),
-        {.reason = "MEMORY_LIMIT", .field = option_});
+    const absl::Status refused =
+        MakeError(absl::StatusCode::kResourceExhausted,
+                  absl::StrCat(what, " ", FormatBytes(bytes), "; ",
+                               FormatBytes(used() - reclaimable), " of ",
+                               FormatBytes(limit_), " (", option_,
+                               ") are in use: delete what is no longer needed"),
+                  {.reason = "MEMORY_LIMIT", .field = option_});
+    return bytes <= limit_ ? RetryLater(refused) : refused;
   }
 }
 

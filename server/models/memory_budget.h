@@ -60,7 +60,8 @@ class MemoryBudget {
       : limit_(limit), option_(option), reclaim_(std::move(reclaim)) {}
 
   // ResourceExhausted MEMORY_LIMIT with figures, about the field `option`.
-  // `what` begins the message: "weights need 2 GiB; ...".
+  // `what` begins the message: "weights need 2 GiB; ...". Trying again may help
+  // if it would fit into an empty budget.
   absl::StatusOr<Reservation> Reserve(int64_t bytes, absl::string_view what);
 
   int64_t limit() const { return limit_; }

@@ -71,6 +71,10 @@ std::shared_ptr<const Binding> WeightsCache::Slot::Put(
     MutexLock lock(cache_.mutex_);
     std::swap(resident_, former);
     bytes_ = resident->memory.bytes();
+    const CompressedWeights* compressed = resident->binding->compressed();
+    compressed_ = compressed != nullptr;
+    bound_ = compressed_ ? compressed->bound() : 0;
+    if (compressed_) why_dense_.clear();
   }
   Touch();
   return Hand(resident);
@@ -92,9 +96,17 @@ void WeightsCache::Slot::Touch() {
   cache_.slots_.splice(cache_.slots_.end(), cache_.slots_, place_);
 }
 
+void WeightsCache::Slot::StayDense(absl::string_view why) {
+  MutexLock lock(cache_.mutex_);
+  why_dense_ = std::string(why);
+}
+
 WeightsCache::Slot::State WeightsCache::Slot::state() const {
   MutexLock lock(cache_.mutex_);
   return {.resident = resident_ != nullptr,
+          .compressed = compressed_,
+          .bound = bound_,
+          .why_dense = why_dense_,
           .bytes = bytes_,
           .users = resident_ == nullptr
                        ? 0

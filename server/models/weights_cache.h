@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <list>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "absl/strings/string_view.h"
@@ -42,10 +43,17 @@ class WeightsCache {
     std::shared_ptr<const Binding> Put(std::shared_ptr<const Binding> binding,
                                        MemoryBudget::Reservation memory);
 
+    // Why the weights are not compressed, for those who asked for that.
+    void StayDense(absl::string_view why);
+
     struct State {
       bool resident = false;
-      int64_t bytes = 0;  // Of the weights, now or when they were here.
-      int users = 0;      // Pointers handed out; while there are any they stay.
+      // Of the weights, now or when they were here.
+      bool compressed = false;
+      double bound = 0;       // CompressedWeights::bound()
+      std::string why_dense;  // Empty if they are compressed, or will be.
+      int64_t bytes = 0;
+      int users = 0;  // Pointers handed out; while there are any they stay.
       absl::Time last_use;  // When they were last put here, taken or let go.
     };
     State state() const;
@@ -63,6 +71,9 @@ class WeightsCache {
     std::list<Slot*>::iterator place_;
     std::shared_ptr<const Resident> resident_;
     int64_t bytes_ = 0;
+    bool compressed_ = false;
+    double bound_ = 0;
+    std::string why_dense_;
     absl::Time last_use_ = absl::InfinitePast();
   };
 

@@ -72,10 +72,14 @@ absl::StatusOr<Quality> Measure(
 void BindingService::Describe(const BindingRecord& record, Detail detail,
                               v1::Binding* out) {
   ToProto(record, detail, out);
-  const auto progress = bindings_.ProgressOf(record);
-  if (!progress) return;
-  out->set_weight_state(v1::WEIGHT_STATE_COMPUTING);
-  ToProto(*progress, out->mutable_progress());
+  if (const auto progress = bindings_.compressor().ProgressOf(record)) {
+    out->set_weight_form(v1::WEIGHT_FORM_COMPRESSING);
+    ToProto(*progress, out->mutable_progress());
+  }
+  if (const auto progress = bindings_.ProgressOf(record)) {
+    out->set_weight_state(v1::WEIGHT_STATE_COMPUTING);
+    ToProto(*progress, out->mutable_progress());
+  }
 }
 
 absl::StatusOr<std::shared_ptr<const Mesh>> BindingService::BoxedModel(
@@ -94,7 +98,8 @@ grpc::Status BindingService::CreateBinding(
   return calls_.Run("CreateBinding", *context, [&]() -> absl::Status {
     CallRunner::Watch watch(calls_, *context);
     DEFORM_ASSIGN_OR_RETURN(const auto model, BoxedModel(*request));
-    DEFORM_ASSIGN_OR_RETURN(BindSpec spec, FromProto(*request, model.get()));
+    DEFORM_ASSIGN_OR_RETURN(
+        BindSpec spec, FromProto(*request, model.get(), weight_tolerance_));
     DEFORM_ASSIGN_OR_RETURN(const auto waiter,
                             bindings_.Create(std::move(spec)));
     DEFORM_ASSIGN_OR_RETURN(const CreatedBinding created,

@@ -12,13 +12,16 @@ namespace deform::server {
 
 class BindingService final : public v1::BindingService::Service {
  public:
-  // All are borrowed. `background` recomputes weights and measures quality.
+  // All are borrowed. `background` recomputes weights and measures quality;
+  // `weight_tolerance` is that of requests which name none.
   BindingService(CallRunner& calls, BindingRegistry& bindings,
-                 SessionManager& sessions, ThreadPool& background)
+                 SessionManager& sessions, ThreadPool& background,
+                 double weight_tolerance)
       : calls_(calls),
         bindings_(bindings),
         sessions_(sessions),
-        background_(background) {}
+        background_(background),
+        weight_tolerance_(weight_tolerance) {}
 
   grpc::Status CreateBinding(
       grpc::ServerContext* context, const v1::CreateBindingRequest* request,
@@ -56,6 +59,7 @@ class BindingService final : public v1::BindingService::Service {
   BindingRegistry& bindings_;
   SessionManager& sessions_;
   ThreadPool& background_;
+  const double weight_tolerance_;
 };
 
 }  // namespace deform::server

@@ -9,6 +9,7 @@
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
 #include "core/frames/encoding.h"
+#include "core/weights/compress_binding.h"
 
 namespace deform::server {
 namespace {
@@ -225,7 +226,11 @@ absl::StatusOr<ModelUpload::Header> FromProto(const v1::ModelHeader& header) {
 }
 
 absl::StatusOr<BindSpec> FromProto(const v1::CreateBindingRequest& request,
-                                   const Mesh* model) {
+                                   const Mesh* model, double weight_tolerance) {
+  if (request.has_weight_tolerance()) {
+    weight_tolerance = request.weight_tolerance();
+  }
+  DEFORM_RETURN_IF_ERROR(CheckWeightTolerance(weight_tolerance));
   DEFORM_ASSIGN_OR_RETURN(std::string tenant, TenantOr(request.tenant()));
   DEFORM_RETURN_IF_ERROR(CheckName(request.model_id(), "model_id"));
   if (request.scheme().empty()) {
@@ -252,7 +257,8 @@ absl::StatusOr<BindSpec> FromProto(const v1::CreateBindingRequest& request,
       .unbindable = request.unbindable() == v1::UNBINDABLE_REPORT
                         ? Unbindable::kReport
                         : Unbindable::kFail,
-      .clamped = std::move(clamped)};
+      .clamped = std::move(clamped),
+      .weight_tolerance = weight_tolerance};
 }
 
 absl::StatusOr<PoseUpdate> FromProto(const v1::Pose& pose, int dimension) {
@@ -328,6 +334,17 @@ void ToProto(const BindingRecord& record, Detail detail, v1::Binding* out) {
   out->set_weight_bytes(weights.bytes);
   out->set_weight_state(weights.resident ? v1::WEIGHT_STATE_RESIDENT
                                          : v1::WEIGHT_STATE_EVICTED);
+  out->set_weight_form(weights.compressed ? v1::WEIGHT_FORM_COMPRESSED
+                                          : v1::WEIGHT_FORM_DENSE);
+  out->set_weight_tolerance(record.weight_tolerance);
+  out->set_weight_error_bound(weights.bound);
+  const int64_t dense_bytes = DenseWeightBytes(binding);
+  out->set_dense_weight_bytes(dense_bytes);
+  if (weights.bytes > 0) {
+    out->set_compression_ratio(static_cast<double>(dense_bytes) /
+                               static_cast<double>(weights.bytes));
+  }
+  out->set_why_dense(weights.why_dense);
   out->set_weight_users(weights.users);
   ToProto(weights.last_use, out->mutable_last_use_time());
   out->set_compute_seconds(binding.compute_seconds());

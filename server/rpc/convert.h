@@ -31,10 +31,12 @@ absl::StatusOr<PageRequest> ToPageRequest(uint32_t page_size,
 absl::StatusOr<ModelUpload::Header> FromProto(const v1::ModelHeader& header);
 
 // BAD_NAME, MISSING_FIELD (scheme, rig), WRONG_LENGTH, BAD_DIMENSION,
-// INDEX_OUT_OF_RANGE, UNKNOWN_VALUE, WRONG_RIG, and what Cage and Handles
-// refuse. `model` is read if the request wants handles at its box.
+// INDEX_OUT_OF_RANGE, UNKNOWN_VALUE, WRONG_RIG, WEIGHT_TOLERANCE_OUT_OF_RANGE,
+// and what Cage and Handles refuse. `model` is read if the request wants
+// handles at its box; `weight_tolerance` holds if it names none.
 absl::StatusOr<BindSpec> FromProto(const v1::CreateBindingRequest& request,
-                                   const Mesh* model = nullptr);
+                                   const Mesh* model = nullptr,
+                                   double weight_tolerance = 0);
 
 // WRONG_LENGTH, INDEX_OUT_OF_RANGE; CheckPoseUpdate() checks the rest.
 absl::StatusOr<PoseUpdate> FromProto(const v1::Pose& pose, int dimension);

@@ -40,6 +40,7 @@ BindSpec SpecOf(const BindingRecord& record, const EditedHandles& edited,
           .exits = request.exits,
           .unbindable = request.unbindable,
           .clamped = request.clamped,
+          .weight_tolerance = record.weight_tolerance,
           .known = std::move(known)};
 }
 

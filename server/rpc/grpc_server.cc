@@ -81,12 +81,13 @@ std::string AddressOf(const std::string& listen, int port) {
 class GrpcServerImpl final : public GrpcServer {
  public:
   GrpcServerImpl(const Options& options, const Rooms& rooms)
-      : sessions_(rooms.sessions),
+      : bindings_(rooms.bindings),
+        sessions_(rooms.sessions),
         calls_(rooms.sessions.clock(), options.stall_timeout),
         streams_(rooms.sessions, options.stall_timeout),
         model_service_(calls_, rooms.models),
         binding_service_(calls_, rooms.bindings, rooms.sessions,
-                         rooms.background),
+                         rooms.background, options.weight_tolerance),
         session_service_(calls_, rooms.sessions, streams_),
         server_service_(calls_, rooms, streams_) {}
 
@@ -126,6 +127,7 @@ class GrpcServerImpl final : public GrpcServer {
     const auto end = std::chrono::steady_clock::now() + patience;
     server_->GetHealthCheckService()->SetServingStatus(false);
     calls_.Refuse(Draining());
+    bindings_.compressor().Stop();
     sessions_.Drain();
     while (Busy() && std::chrono::steady_clock::now() < end) {
       std::this_thread::sleep_for(kDrainPollInterval);
@@ -159,6 +161,7 @@ class GrpcServerImpl final : public GrpcServer {
     }
   }
 
+  BindingRegistry& bindings_;
   SessionManager& sessions_;
   CallRunner calls_;
   DeformStreams streams_;

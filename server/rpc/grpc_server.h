@@ -28,6 +28,7 @@ class GrpcServer {
     // Threads for calls that wait for a thread's answer (all but Deform).
     int max_call_threads = 64;
     std::chrono::milliseconds stall_timeout{10000};
+    double weight_tolerance = 0;  // Of bindings whose request names none.
   };
 
   // Serves from the moment this returns: the API, grpc.health.v1 and

@@ -7,6 +7,7 @@
 #include "core/base/error.h"
 #include "google/rpc/error_details.pb.h"
 #include "server/models/names.h"
+#include "server/models/retry.h"
 
 namespace deform::server {
 namespace {
@@ -51,7 +52,7 @@ void AddDetails(const absl::Status& status, const std::string& message,
     resource.set_resource_name(Cut(detail.resource_name, kMaxNameBytes));
     rpc.add_details()->PackFrom(resource);
   }
-  if (status.code() == absl::StatusCode::kUnavailable) {
+  if (MayDoLater(status)) {
     google::rpc::RetryInfo retry;
     retry.mutable_retry_delay()->set_seconds(1);
     rpc.add_details()->PackFrom(retry);

@@ -122,6 +122,15 @@ void Session::Move(RigMove move) {
   move.done(closed);
 }
 
+void Session::Refresh() {
+  MutexLock lock(mutex_);
+  if (closed_) return;
+  auto now = lease_.record()->weights->Get();
+  if (now == nullptr || now == binding_) return;
+  refreshed_ = std::move(now);
+  Schedule();
+}
+
 void Session::End(const absl::Status& status) {
   Receivers receivers;
   std::deque<RigMove> moves;
@@ -180,7 +189,10 @@ bool Session::NeedsFrame() const {
 }
 
 void Session::Schedule() {
-  if (scheduled_ || !(CanStep() || CanMove() || NeedsFrame())) return;
+  if (scheduled_ ||
+      !(CanStep() || CanMove() || NeedsFrame() || refreshed_ != nullptr)) {
+    return;
+  }
   scheduled_ = true;
   environment_.scheduler->Add(shared_from_this(), *binding_);
 }
@@ -191,7 +203,9 @@ Session::Step Session::BeginStep() {
   step.binding_id = binding_id_;
   // Who has joined sees the state as it was before anything newer.
   if (!NeedsFrame()) {
-    if (CanMove()) {
+    if (refreshed_ != nullptr) {
+      step.refreshed = std::move(refreshed_);
+    } else if (CanMove()) {
       step.move = std::move(moves_.front());
       moves_.pop_front();
     } else if (CanStep()) {
@@ -211,6 +225,7 @@ Session::Step Session::BeginStep() {
 void Session::FinishStep(Step step, ThreadPool* pool) {
   absl::Status moved;
   if (step.move) moved = ChangeRig(step, pool);
+  if (step.refreshed != nullptr) ChangeForm(step, pool);
   if (step.pose) Describe(step.pose->pose, step.report, step.deform_time);
   Frames frames;
   for (const FrameEncoding* encoding : step.encodings) {
@@ -223,6 +238,7 @@ void Session::FinishStep(Step step, ThreadPool* pool) {
   // The binding before is let go before anyone learns of it.
   const auto done = std::move(step.move->done);
   step.move.reset();
+  Refresh();
   if (step.change != nullptr) {
     done(RigMoved{step.change->revision, step.change->largest_jump});
   } else {
@@ -278,6 +294,17 @@ absl::Status Session::ChangeRig(Step& step, ThreadPool* pool) {
   return absl::OkStatus();
 }
 
+void Session::ChangeForm(Step& step, ThreadPool* pool) {
+  const Pose pose = deformer_->pose();
+  auto next = std::make_unique<Deformer>(step.refreshed, nullptr);
+  DeformJob job{.deformer = next.get(), .pose = &pose};
+  MoveTogether({&job, 1}, pool);
+  deformer_ = std::move(next);
+  // The former weights go with the step, not under the lock.
+  MutexLock lock(mutex_);
+  binding_.swap(step.refreshed);
+}
+
 Session::Receivers Session::Publish(Step& step, Frames frames) {
   MutexLock lock(mutex_);
   if (step.change != nullptr) PublishChange(step);
@@ -305,6 +332,7 @@ Session::Receivers Session::Publish(Step& step, Frames frames) {
 }
 
 void Session::PublishChange(Step& step) {
+  refreshed_.reset();  // Of the binding before.
   pose_ = step.change->transfer.pose();
   queue_.Transfer(step.change->transfer);
   if (!closed_) lease_ = std::move(step.move->to.lease);

@@ -150,6 +150,11 @@ class Session : public std::enable_shared_from_this<Session> {
   // first frame of it. The outcome goes to `move.done`.
   void Move(RigMove move);
 
+  // If the weights of its binding have another form by now, changes over to it
+  // before the next pose. That is no revision: who joins may see the present
+  // one apart from others by the bound of compressed weights.
+  void Refresh();
+
   // Ends every stream with `status` and lets the binding go.
   void End(const absl::Status& status);
   // Takes no more poses; ends every stream with `status` once the poses that
@@ -158,9 +163,10 @@ class Session : public std::enable_shared_from_this<Session> {
 
   // What is to be done next.
   struct Step {
-    // Neither: only frames are wanted.
+    // None of these: only frames are wanted.
     std::optional<PoseQueue::Step> pose;
     std::optional<RigMove> move;
+    std::shared_ptr<const Binding> refreshed;
     std::shared_ptr<const RigChange> change;  // What the move made.
     std::string binding_id;                   // Before it.
     std::vector<const FrameEncoding*> encodings;
@@ -214,6 +220,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Receivers ReceiversLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   absl::Status ChangeRig(Step& step, ThreadPool* pool);
+  void ChangeForm(Step& step, ThreadPool* pool);
   void Describe(const Pose& pose, const DeformReport& report,
                 std::chrono::microseconds time);
   Receivers Publish(Step& step, Frames frames);
@@ -235,6 +242,8 @@ class Session : public std::enable_shared_from_this<Session> {
   BindingCatalogue::Lease lease_ ABSL_GUARDED_BY(mutex_);
   std::string binding_id_ ABSL_GUARDED_BY(mutex_);
   std::shared_ptr<const Binding> binding_ ABSL_GUARDED_BY(mutex_);
+  // The same weights in another form, to be changed over to.
+  std::shared_ptr<const Binding> refreshed_ ABSL_GUARDED_BY(mutex_);
   std::deque<RigMove> moves_ ABSL_GUARDED_BY(mutex_);
   // The last of all changes of the rig.
   std::deque<std::shared_ptr<const RigChange>> changes_ ABSL_GUARDED_BY(mutex_);

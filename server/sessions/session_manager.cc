@@ -29,7 +29,18 @@ absl::Status Draining() {
                    {.reason = "SERVER_DRAINING"});
 }
 
+SessionManager::SessionManager(BindingRegistry& bindings, const Limits& limits,
+                               SessionEnvironment environment)
+    : environment_(std::move(environment)),
+      bindings_(bindings),
+      budget_(limits.memory, "max-sessions-memory"),
+      sessions_("session", limits.count, "max-sessions") {
+  bindings_.compressor().SetListener(
+      [this](const BindingRecord& record) { Refresh(record); });
+}
+
 SessionManager::~SessionManager() {
+  bindings_.compressor().SetListener({});
   for (const auto& session : sessions_.All()) session->End(Draining());
 }
 
@@ -60,6 +71,8 @@ absl::StatusOr<std::shared_ptr<Session>> SessionManager::Create(
     DEFORM_ASSIGN_OR_RETURN(auto inserted,
                             sessions_.Insert(tenant, id, std::move(made)));
     session = std::move(inserted.first);
+    // If the form has changed before the session could be told.
+    (*session)->Refresh();
   }
   const std::string has = (*session)->state().binding_id;
   if (has != binding_id) {
@@ -120,6 +133,15 @@ void SessionManager::Move(const BindingRecord& from, const BindingRecord& to,
       return absl::OkStatus();
     };
     if (const absl::Status status = move(); !status.ok()) done(status);
+  }
+}
+
+void SessionManager::Refresh(const BindingRecord& record) {
+  for (const auto& session : sessions_.All()) {
+    const SessionState state = session->state();
+    if (state.tenant == record.tenant && state.binding_id == record.id) {
+      session->Refresh();
+    }
   }
 }
 

@@ -27,11 +27,7 @@ class SessionManager {
 
   // Bindings are borrowed; so is what the environment points to.
   SessionManager(BindingRegistry& bindings, const Limits& limits,
-                 SessionEnvironment environment)
-      : environment_(std::move(environment)),
-        bindings_(bindings),
-        budget_(limits.memory, "max-sessions-memory"),
-        sessions_("session", limits.count, "max-sessions") {}
+                 SessionEnvironment environment);
   // Ends what is left.
   ~SessionManager();
 
@@ -68,6 +64,9 @@ class SessionManager {
   const Clock& clock() const { return environment_.clock; }
 
  private:
+  // The weights of this binding have another form.
+  void Refresh(const BindingRecord& record);
+
   const SessionEnvironment environment_;
   BindingRegistry& bindings_;
   MemoryBudget budget_;

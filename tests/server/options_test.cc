@@ -58,6 +58,7 @@ TEST(Options, WrittenAsTomlAreReadAsTheyWere) {
   options.max_bindings_memory = {int64_t{3} << 40};
   options.stall_timeout = {0.25};
   options.max_participants = 7;
+  options.weight_tolerance = {3e-4};
   const std::string toml = WriteToml(options);
   Options read;
   ASSERT_TRUE(ReadToml(toml, "f", read).ok());
@@ -119,6 +120,12 @@ INSTANTIATE_TEST_SUITE_P(
         {"OutOfRange", "\n\nmax-participants = 0\n",
          "deformd.toml:3: max-participants: must be between 1 and 100000, not "
          "0"},
+        {"Tolerance", "weight-tolerance = 0.5\n",
+         "weight-tolerance: must be 0 or between 1e-06 and 0.01, not 0.5"},
+        {"NoTolerance", "weight-tolerance = nan\n",
+         "weight-tolerance: must be 0 or between 1e-06 and 0.01, not nan"},
+        {"TextForTolerance", "weight-tolerance = \"1e-5\"\n",
+         "weight-tolerance: is a number"},
         {"BeyondInt", "max-participants = 4294967297\n",
          "max-participants: is a whole number, not \"4294967297\""},
         {"Seconds", "stall-timeout = \"soon\"\n",

@@ -55,6 +55,7 @@ const Command& BindCommand() {
       "deformctl bind $model --cage partial.obj --exit auto\n"
       "deformctl bind $model --cage cage.obj --scheme mean_value\n"
       "deformctl bind $model --cage cage.obj --clamp 0,17,18\n"
+      "deformctl bind $model --cage cage.obj --weight-tolerance 1e-4\n"
       "deformctl bind $model --handles points.obj --add-box\n"
       "deformctl bind $model --handles points.obj --scheme t_cc "
       "--handle-weights 0,0,1,0.5",

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "client/cli/command.h"
 #include "client/cli/info_text.h"
 #include "core/base/status_macros.h"
@@ -59,6 +60,9 @@ absl::Status ListBindings(Client& client, const std::string& model,
                {"POINTS", kRight},
                {"COLUMNS", kRight},
                {"MEMORY", kRight},
+               {"FORM"},
+               {"RATIO", kRight},
+               {"BOUND", kRight},
                {"KEPT"},
                {"LAST USE"},
                {"NOT BOUND", kRight},
@@ -69,9 +73,11 @@ absl::Status ListBindings(Client& client, const std::string& model,
         {binding.binding_id, binding.model_id.substr(0, 12), binding.scheme,
          Thousands(binding.point_count),
          Thousands(binding.vertex_count + binding.normal_count),
-         Bytes(binding.weight_bytes), WeightStateText(binding.weight_state),
-         TimeText(binding.last_use_time), Thousands(binding.unbound_count),
-         TimeText(binding.create_time)});
+         Bytes(binding.weight_bytes), WeightFormText(binding.weight_form),
+         absl::StrFormat("%.3g", binding.compression_ratio),
+         absl::StrFormat("%.2g", binding.weight_error_bound),
+         WeightStateText(binding.weight_state), TimeText(binding.last_use_time),
+         Thousands(binding.unbound_count), TimeText(binding.create_time)});
   }
   Print(console, "bindings", list, table);
   return absl::OkStatus();

@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <deque>
 #include <fstream>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -64,7 +66,8 @@ class ResidentMemoryTest : public testing::Test {
                   {.tenant = "t",
                    .model_id = model.record->id,
                    .rig = CageOf(Cuboid(Vec3::Constant(-2), Vec3::Constant(2))),
-                   .scheme = "green"})
+                   .scheme = "green",
+                   .weight_tolerance = 1e-3})
               .value();
       binding_ids_.push_back(
           waiter->Wait(std::chrono::minutes(1)).value().value().record->id);
@@ -84,13 +87,26 @@ class ResidentMemoryTest : public testing::Test {
   }
   int64_t Grown() const { return ResidentBytes() - begin_; }
 
+  void TearDown() override { Compress(); }
+  void Compress() {
+    while (!compressions_.empty()) {
+      const auto task = std::move(compressions_.front());
+      compressions_.pop_front();
+      task();
+    }
+  }
+
+  std::deque<std::function<void()>> compressions_;
   ThreadPool pool_{{.threads = 2}};
   ModelRegistry models_{
       {.model_bytes = 1 << 30, .memory = 1 << 30, .count = 1000}};
   BindingRegistry bindings_{
       models_,
       pool_,
-      {.memory = 1 << 30, .count = 1000, .concurrent = 1, .waiting_calls = 1}};
+      {.memory = 1 << 30, .count = 1000, .concurrent = 1, .waiting_calls = 1},
+      &Bind,
+      {.executor = [this](auto task) { compressions_.push_back(task); },
+       .is_worth = [](int64_t) { return true; }}};
   std::vector<std::string> model_ids_, binding_ids_;
   int made_ = 0;
   int64_t begin_ = 0;
@@ -119,6 +135,16 @@ TEST_F(ResidentMemoryTest, DoesNotGrowWithWhatIsMadeAndDeletedAgain) {
     Delete();
   }
   EXPECT_LT(Grown(), kSlack);
+}
+
+TEST_F(ResidentMemoryTest, FallsWithCompression) {
+  Register(kModels);
+  const int64_t dense = Counted(), grown = Grown();
+  Compress();
+  // Points at random, far from a cage of 20 columns: few directions.
+  EXPECT_LT(bindings_.budget().used(), dense / 4);
+  EXPECT_LT(Grown(), grown - (dense - Counted()) * 0.9 + kSlack);
+  EXPECT_LT(Grown(), Counted() * 1.1 + kSlack);
 }
 
 TEST_F(ResidentMemoryTest, ComesBackWithEviction) {

@@ -3,8 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
+#include <limits>
 
+#include "absl/strings/str_cat.h"
 #include "core/base/error.h"
 #include "tests/support/shapes.h"
 
@@ -57,6 +60,31 @@ TEST(ConvertBinding, TakesHandlesAndOptions) {
   EXPECT_EQ(spec.options.handle_weights, std::vector<double>{0.5});
   EXPECT_EQ(spec.options.lambda, 3);
   EXPECT_EQ(spec.unbindable, Unbindable::kReport);
+}
+
+TEST(ConvertBinding, TakesTheServersWeightToleranceIfItNamesNone) {
+  v1::CreateBindingRequest request = GoodRequest();
+  EXPECT_EQ(FromProto(request, nullptr, 1e-5)->weight_tolerance, 1e-5);
+  request.set_weight_tolerance(1e-3);
+  EXPECT_EQ(FromProto(request, nullptr, 1e-5)->weight_tolerance, 1e-3);
+  request.set_weight_tolerance(0);
+  EXPECT_EQ(FromProto(request, nullptr, 1e-5)->weight_tolerance, 0);
+}
+
+TEST(ConvertBinding, RefusesWeightTolerancesOutOfRange) {
+  v1::CreateBindingRequest request = GoodRequest();
+  for (const double tolerance : {-1e-5, 1e-7, 0.02, std::nan(""),
+                                 std::numeric_limits<double>::infinity()}) {
+    request.set_weight_tolerance(tolerance);
+    const absl::Status refused = FromProto(request).status();
+    EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_EQ(DetailOf(refused).reason, "WEIGHT_TOLERANCE_OUT_OF_RANGE");
+    EXPECT_EQ(DetailOf(refused).field, "weight_tolerance");
+    EXPECT_EQ(refused.message(),
+              absl::StrCat("weight tolerance must be 0 (dense weights) or in "
+                           "[1e-06, 0.01], not ",
+                           tolerance));
+  }
 }
 
 TEST(ConvertBinding, AddsHandlesAtTheBoxOfTheModel) {

@@ -7,6 +7,7 @@
 
 #include "core/base/error.h"
 #include "google/rpc/error_details.pb.h"
+#include "server/models/memory_budget.h"
 
 namespace deform::server {
 namespace {
@@ -77,6 +78,15 @@ TEST(Status, SaysWhenTryingAgainMayHelp) {
   EXPECT_EQ(Find<google::rpc::RetryInfo>(status)->retry_delay().seconds(), 1);
   EXPECT_FALSE(Find<google::rpc::RetryInfo>(
       Rpc(absl::StatusCode::kNotFound, {.reason = "X"})));
+}
+
+TEST(Status, SaysThatMemoryMayBeFreeLaterUnlessTheLimitIsTooLow) {
+  MemoryBudget budget(100, "limit");
+  const auto held = budget.Reserve(60, "it needs").value();
+  EXPECT_TRUE(Find<google::rpc::RetryInfo>(
+      ToRpcStatus(budget.Reserve(50, "it needs").status())));
+  EXPECT_FALSE(Find<google::rpc::RetryInfo>(
+      ToRpcStatus(budget.Reserve(101, "it needs").status())));
 }
 
 TEST(Status, TravelsInTheDetailsOfACall) {

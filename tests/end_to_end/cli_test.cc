@@ -75,6 +75,25 @@ TEST_F(Cli, BindAddsTheBoxAndClampsOnRequest) {
               HasSubstr("--clamp: entry 0 (1.5) is not the number of a point"));
 }
 
+TEST_F(Cli, BindTakesAWeightToleranceAndTellsTheForm) {
+  const std::string model = Register();
+  const CliResult told = Run({"bind", model, "--cage", Path("cube.obj"),
+                              "--weight-tolerance", "1e-4"});
+  EXPECT_THAT(told.out, HasSubstr("form           dense: they are small: "));
+  const Json dense = RunJson(
+      {"bind", model, "--cage", Path("cube.obj"), "--weight-tolerance", "0"});
+  EXPECT_EQ(dense["weight_tolerance"], 0);
+  EXPECT_EQ(dense["weight_form"], "dense");
+  EXPECT_EQ(dense["why_dense"], "");
+  EXPECT_EQ(dense["compression_ratio"], 1);
+  EXPECT_EQ(dense["dense_weight_bytes"], dense["weight_bytes"]);
+  EXPECT_THAT(Run({"list", "bindings"}).out, HasSubstr("dense"));
+  const CliResult refused = Run(
+      {"bind", model, "--cage", Path("cube.obj"), "--weight-tolerance", "0.5"});
+  EXPECT_EQ(refused.exit_code, kRefused);
+  EXPECT_THAT(refused.err, HasSubstr("in [1e-06, 0.01], not 0.5"));
+}
+
 TEST_F(Cli, HandlesEditsABindingAndTellsWhatMoved) {
   // One in the middle, and the corners of the cube.
   Positions handles = Positions::Zero(9, 3);

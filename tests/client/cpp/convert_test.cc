@@ -93,6 +93,37 @@ TEST(BindingRequest, KeepsFixedHandlesTheBoxAndClampedPoints) {
   EXPECT_EQ(back.fixed, spec.rig.fixed);
 }
 
+TEST(BindingRequest, CarriesTheWeightToleranceOnlyWhenItIsSet) {
+  BindingSpec spec;
+  EXPECT_FALSE(ToProto(spec, "t").has_weight_tolerance());
+  spec.weight_tolerance = 0;
+  EXPECT_TRUE(ToProto(spec, "t").has_weight_tolerance());
+  spec.weight_tolerance = 1e-4;
+  EXPECT_EQ(ToProto(spec, "t").weight_tolerance(), 1e-4);
+}
+
+TEST(FormOfABinding, IsReadFigureByFigure) {
+  v1::Binding binding;
+  EXPECT_EQ(FromProto(binding).weight_form, WeightForm::kUnknown);
+  binding.set_weight_form(v1::WEIGHT_FORM_DENSE);
+  EXPECT_EQ(FromProto(binding).weight_form, WeightForm::kDense);
+  binding.set_weight_form(v1::WEIGHT_FORM_COMPRESSING);
+  EXPECT_EQ(FromProto(binding).weight_form, WeightForm::kCompressing);
+  binding.set_weight_form(v1::WEIGHT_FORM_COMPRESSED);
+  binding.set_weight_tolerance(1e-4);
+  binding.set_weight_error_bound(0.5e-4);
+  binding.set_dense_weight_bytes(30);
+  binding.set_compression_ratio(3);
+  binding.set_why_dense("no");
+  const BindingInfo info = FromProto(binding);
+  EXPECT_EQ(info.weight_form, WeightForm::kCompressed);
+  EXPECT_EQ(info.weight_tolerance, 1e-4);
+  EXPECT_EQ(info.weight_error_bound, 0.5e-4);
+  EXPECT_EQ(info.dense_weight_bytes, 30);
+  EXPECT_EQ(info.compression_ratio, 3);
+  EXPECT_EQ(info.why_dense, "no");
+}
+
 TEST(PoseMessage, CarriesTheBlendOnlyWhenItIsSet) {
   PoseUpdate update{.vertices = {4}, .positions = Rows({{1, 2, 3}})};
   EXPECT_FALSE(ToProto(update, 3, 1).has_stretch_blend());

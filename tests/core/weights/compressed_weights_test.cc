@@ -297,6 +297,24 @@ TEST(CompressedWeights, CanBeCancelled) {
   EXPECT_EQ(outcome.status().code(), absl::StatusCode::kCancelled);
 }
 
+TEST(CompressedWeights, AreGivenUpOnceTheyTakeMoreThanTheyMay) {
+  const BindingPtr dense = Dense(InBall(*AllSchemes()[0], 3, 5000));
+  const int64_t bytes = Compressed(*dense, 1e-4)->compressed()->bytes();
+  std::atomic<int64_t> done = 0;
+  const auto fits =
+      CompressBinding(*dense, &dense->weights(), 1e-4,
+                      {.points_done = &done, .max_weight_bytes = bytes});
+  EXPECT_TRUE(fits.ok()) << fits.status();
+  EXPECT_EQ(done, 5000);
+  const auto outcome = CompressBinding(*dense, &dense->weights(), 1e-4,
+                                       {.max_weight_bytes = bytes / 2});
+  EXPECT_EQ(outcome.status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(DetailOf(outcome.status()).reason, "NOT_SMALLER");
+  EXPECT_EQ(outcome.status().message(),
+            "compressed weights would take more than " +
+                std::to_string(bytes / 2) + " bytes");
+}
+
 TEST(CompressedWeights, RefuseAToleranceOutOfRange) {
   BindRequest request = InBall(*AllSchemes()[0], 3, 10);
   for (const double tolerance : {-1.0, 1e-7, 0.02, std::nan("")}) {

@@ -17,6 +17,20 @@ absl::Status StayDense(absl::string_view why) {
   return absl::FailedPreconditionError(why);
 }
 
+// What is needed of a record: a binding that is removed meanwhile lets its
+// model go at once.
+BindingRecord WithoutLease(const BindingRecord& record) {
+  return {.tenant = record.tenant,
+          .id = record.id,
+          .model_id = record.model_id,
+          .weight_tolerance = record.weight_tolerance,
+          .facts = record.facts,
+          .weights = record.weights,
+          .create_time = record.create_time,
+          .memory = {},
+          .model = {}};
+}
+
 std::string TooSmall(int64_t dense_bytes) {
   return absl::StrCat("they are small: ", FormatBytes(dense_bytes),
                       " lie in the processor's caches");
@@ -118,8 +132,9 @@ void Compressor::Work() {
 }
 
 void Compressor::Run(Task& task) {
-  const auto record = task.record.lock();
-  if (record == nullptr || task.cancellation.cancelled()) return;
+  std::optional<BindingRecord> record;
+  if (const auto kept = task.record.lock()) record.emplace(WithoutLease(*kept));
+  if (!record || task.cancellation.cancelled()) return;
   const absl::Status replaced = Replace(*record, task);
   ReturnFreedMemory();
   if (!replaced.ok()) {

@@ -236,6 +236,7 @@ TEST_F(CompressorTest, ABindingThatIsRemovedWhileItIsCompressedIsGivenUp) {
   std::string id;
   compress_ = [&](const Binding& dense, const BindControl& control) {
     EXPECT_TRUE(bindings_->Remove("t", id).ok());
+    EXPECT_TRUE(models_.catalogue().Remove("t", model_id_).ok());
     EXPECT_TRUE(control.cancellation->cancelled());
     return Compressed(dense, 0);
   };
@@ -245,6 +246,7 @@ TEST_F(CompressorTest, ABindingThatIsRemovedWhileItIsCompressedIsGivenUp) {
   EXPECT_THAT(told_, testing::IsEmpty());
   EXPECT_EQ(bindings_->budget().used(), 0);
   // Made again, it begins anew.
+  ASSERT_TRUE(models_.Register("t", "", MeshOf(Icosphere(1, 1))).ok());
   compress_ = [](const Binding& dense, const BindControl&) {
     return Compressed(dense, 0);
   };

@@ -96,6 +96,12 @@ absl::StatusOr<PosePattern> MakePattern(const LoadStageOptions& options,
   return pattern(Kind::kSequence, std::move(poses));
 }
 
+// Compressed weights are off by their tolerance times a displacement, which is
+// no larger than the rig, at rest or posed: the unit of FrameJudge.
+double Allowed(const LoadStageOptions& options, const BindingInfo& binding) {
+  return options.tolerance + binding.weight_tolerance;
+}
+
 }  // namespace
 
 const std::vector<std::string>& LoadPatterns() {
@@ -140,7 +146,7 @@ absl::Status LoadStage::Generate(Context& context,
   if (options.check) {
     DEFORM_ASSIGN_OR_RETURN(
         FrameJudge own,
-        FrameJudge::FromModel(made.model, made.spec, options.tolerance));
+        FrameJudge::FromModel(made.model, made.spec, Allowed(options, info)));
     judge = std::make_shared<const FrameJudge>(std::move(own));
   }
   DEFORM_ASSIGN_OR_RETURN(const Rig rig, RigOf(made.spec.rig));
@@ -157,7 +163,7 @@ absl::Status LoadStage::UseBinding(const LoadStageOptions& options) {
   if (options.check) {
     DEFORM_ASSIGN_OR_RETURN(
         FrameJudge asked,
-        FrameJudge::FromServer(client_, info, rig, options.tolerance));
+        FrameJudge::FromServer(client_, info, rig, Allowed(options, info)));
     judge = std::make_shared<const FrameJudge>(std::move(asked));
   }
   return AddTarget(options, info, rig, std::move(judge));

@@ -25,7 +25,7 @@ struct LoadStageOptions {
   int editors = 1;
   double rate = 60;
   bool check = true;
-  double tolerance = 1e-6;
+  double tolerance = 1e-6;  // Beside that of compressed weights.
 };
 
 // "drag", "jitter", "whole", "recorded".

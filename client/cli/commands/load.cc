@@ -323,7 +323,8 @@ void AddModelOptions(CLI::App& app, LoadStageOptions& stage) {
                  "Posed cages or handles, or folders of them, sent in turn")
       ->type_name("FILE");
   app.add_option("--tolerance", stage.tolerance,
-                 "What a position may be off, as a part of the rig's diagonal")
+                 "What a position may be off, as a part of the rig's diagonal, "
+                 "beside the tolerance of compressed weights")
       ->check(CLI::Range(1e-9, 1.0))
       ->capture_default_str();
 }

@@ -71,10 +71,12 @@ absl::StatusOr<Quality> Measure(
 
 void BindingService::Describe(const BindingRecord& record, Detail detail,
                               v1::Binding* out) {
+  // Asked before the form: who has been compressed meanwhile is not dense.
+  const auto compressing = bindings_.compressor().ProgressOf(record);
   ToProto(record, detail, out);
-  if (const auto progress = bindings_.compressor().ProgressOf(record)) {
+  if (compressing && out->weight_form() == v1::WEIGHT_FORM_DENSE) {
     out->set_weight_form(v1::WEIGHT_FORM_COMPRESSING);
-    ToProto(*progress, out->mutable_progress());
+    ToProto(*compressing, out->mutable_progress());
   }
   if (const auto progress = bindings_.ProgressOf(record)) {
     out->set_weight_state(v1::WEIGHT_STATE_COMPUTING);

@@ -14,12 +14,13 @@
 #include "tests/support/shapes.h"
 
 // Sanitizers keep what was freed, and shadows of everything.
-#if defined(__has_feature)
+// GCC tells in one way, Clang in another, and headers lend GCC Clang's way.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define DEFORM_SANITIZED 1
+#elif defined(__has_feature)
 #if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
 #define DEFORM_SANITIZED 1
 #endif
-#elif defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define DEFORM_SANITIZED 1
 #endif
 #ifndef DEFORM_SANITIZED
 #define DEFORM_SANITIZED 0

@@ -74,7 +74,7 @@ SessionState Session::StateLocked() const {
           .binding_id = binding_id_,
           .revision = revision_,
           .epoch = epoch(),
-          .participants = static_cast<int>(seats_.size()),
+          .participants = audience_.size(),
           .create_time = create_time_};
 }
 
@@ -83,28 +83,18 @@ absl::StatusOr<Session::Joined> Session::Join(
     std::weak_ptr<Receiver> receiver) {
   MutexLock lock(mutex_);
   if (closed_) return *closed_;
-  if (static_cast<int>(seats_.size()) >= environment_.max_participants) {
+  if (audience_.size() >= environment_.max_participants) {
     return MakeError(
         absl::StatusCode::kResourceExhausted,
-        absl::StrCat("the session has ", seats_.size(),
+        absl::StrCat("the session has ", audience_.size(),
                      " participants, its limit (max-participants)"),
         {.reason = "TOO_MANY_PARTICIPANTS", .field = "max-participants"});
   }
-  Seat seat{.outbox = Outbox(delivery),
-            .encoding = &encoding,
-            .receiver = std::move(receiver),
-            .first_change = change_count_};
-  const auto frame = frames_.find(&encoding);
-  if (frame != frames_.end()) {
-    seat.outbox.Offer(frame->second, 0);
-  } else {
-    seat.needs_frame = true;
-  }
-  const int64_t number = next_seat_++;
-  seats_.emplace(number, std::move(seat));
+  const int64_t seat = audience_.Add(delivery, encoding, std::move(receiver));
+  senders_[seat] = {.first_change = rig_history_.count()};
   Schedule();
   return Joined{
-      std::unique_ptr<Participant>(new Participant(shared_from_this(), number)),
+      std::unique_ptr<Participant>(new Participant(shared_from_this(), seat)),
       StateLocked(), binding_, pose_};
 }
 
@@ -140,13 +130,11 @@ void Session::End(const absl::Status& status) {
     lease_ = {};
     queue_.Clear();
     moves.swap(moves_);
-    for (auto& [number, seat] : seats_) seat.outbox.EndNow(status);
-    receivers = ReceiversLocked();
+    audience_.EndNow(status);
+    receivers = audience_.receivers();
   }
   for (const RigMove& move : moves) move.done(status);
-  for (const auto& weak : receivers) {
-    if (const auto receiver = weak.lock()) receiver->Wake();
-  }
+  Wake(receivers);
 }
 
 void Session::Drain(const absl::Status& status) {
@@ -154,43 +142,27 @@ void Session::Drain(const absl::Status& status) {
   {
     MutexLock lock(mutex_);
     if (!closed_) closed_ = status;
-    for (auto& [number, seat] : seats_) seat.outbox.EndWhenAnswered(status);
-    receivers = ReceiversLocked();
+    audience_.EndWhenAnswered(status);
+    receivers = audience_.receivers();
   }
+  Wake(receivers);
+}
+
+void Session::Wake(const Receivers& receivers) {
   for (const auto& weak : receivers) {
     if (const auto receiver = weak.lock()) receiver->Wake();
   }
 }
 
-Session::Receivers Session::ReceiversLocked() const {
-  Receivers receivers;
-  for (const auto& [number, seat] : seats_) receivers.push_back(seat.receiver);
-  return receivers;
-}
-
-bool Session::CanStep() const {
-  return !queue_.empty() &&
-         std::none_of(seats_.begin(), seats_.end(), [](const auto& seat) {
-           return seat.second.outbox.full();
-         });
-}
+bool Session::CanStep() const { return !queue_.empty() && audience_.HasRoom(); }
 
 bool Session::CanMove() const {
-  return !moves_.empty() &&
-         std::none_of(seats_.begin(), seats_.end(), [](const auto& seat) {
-           const Outbox& outbox = seat.second.outbox;
-           return outbox.full() || !outbox.has_room_for_rig_changes();
-         });
-}
-
-bool Session::NeedsFrame() const {
-  return std::any_of(seats_.begin(), seats_.end(),
-                     [](const auto& seat) { return seat.second.needs_frame; });
+  return !moves_.empty() && audience_.HasRoomForRigChange();
 }
 
 void Session::Schedule() {
-  if (scheduled_ ||
-      !(CanStep() || CanMove() || NeedsFrame() || refreshed_ != nullptr)) {
+  if (scheduled_ || !(CanStep() || CanMove() || audience_.NeedsFrame() ||
+                      refreshed_ != nullptr)) {
     return;
   }
   scheduled_ = true;
@@ -202,7 +174,7 @@ Session::Step Session::BeginStep() {
   MutexLock lock(mutex_);
   step.binding_id = binding_id_;
   // Who has joined sees the state as it was before anything newer.
-  if (!NeedsFrame()) {
+  if (!audience_.NeedsFrame()) {
     if (refreshed_ != nullptr) {
       step.refreshed = std::move(refreshed_);
     } else if (CanMove()) {
@@ -212,13 +184,7 @@ Session::Step Session::BeginStep() {
       step.pose = queue_.Pop();
     }
   }
-  for (const auto& [number, seat] : seats_) {
-    if ((step.move || step.pose || seat.needs_frame) &&
-        std::find(step.encodings.begin(), step.encodings.end(),
-                  seat.encoding) == step.encodings.end()) {
-      step.encodings.push_back(seat.encoding);
-    }
-  }
+  step.encodings = audience_.Wanted(step.move || step.pose);
   return step;
 }
 
@@ -227,13 +193,11 @@ void Session::FinishStep(Step step, ThreadPool* pool) {
   if (step.move) moved = ChangeRig(step, pool);
   if (step.refreshed != nullptr) ChangeForm(step, pool);
   if (step.pose) Describe(step.pose->pose, step.report, step.deform_time);
-  Frames frames;
+  Audience::Frames frames;
   for (const FrameEncoding* encoding : step.encodings) {
     frames[encoding] = EncodeFrame(*deformer_, *encoding, info_, pool);
   }
-  for (const auto& weak : Publish(step, std::move(frames))) {
-    if (const auto receiver = weak.lock()) receiver->Wake();
-  }
+  Wake(Publish(step, std::move(frames)));
   if (!step.move) return;
   // The binding before is let go before anyone learns of it.
   const auto done = std::move(step.move->done);
@@ -305,30 +269,20 @@ void Session::ChangeForm(Step& step, ThreadPool* pool) {
   binding_.swap(step.refreshed);
 }
 
-Session::Receivers Session::Publish(Step& step, Frames frames) {
+Session::Receivers Session::Publish(Step& step, Audience::Frames frames) {
   MutexLock lock(mutex_);
   if (step.change != nullptr) PublishChange(step);
   if (step.pose) {
     pose_ = step.pose->pose;
     for (const PoseQueue::Answer& answer : step.pose->answers) {
-      const auto seat = seats_.find(answer.participant);
-      if (seat != seats_.end()) seat->second.contained = answer.sequence;
+      audience_.Contain(answer.participant, answer.sequence);
     }
   }
-  const bool newer = revision_ != info_.revision;
-  if (newer) frames_.clear();
   revision_ = info_.revision;
-  frames_.merge(frames);
-  for (auto& [number, seat] : seats_) {
-    if (!newer && !seat.needs_frame) continue;
-    const auto frame = frames_.find(seat.encoding);
-    // Who joined during the step may want an encoding that was not in use.
-    seat.needs_frame = frame == frames_.end();
-    if (!seat.needs_frame) seat.outbox.Offer(frame->second, seat.contained);
-  }
+  audience_.Publish(revision_, std::move(frames));
   scheduled_ = false;
   Schedule();
-  return ReceiversLocked();
+  return audience_.receivers();
 }
 
 void Session::PublishChange(Step& step) {
@@ -339,139 +293,32 @@ void Session::PublishChange(Step& step) {
   memory_ = std::move(step.move->memory);
   binding_id_ = step.change->binding_id;
   binding_ = std::move(step.move->to.binding);
-  changes_.push_back(step.change);
-  ++change_count_;
-  if (changes_.size() > kMaxRigChanges) changes_.pop_front();
-  for (auto& [number, seat] : seats_) seat.outbox.Announce(step.change);
-}
-
-Participant::~Participant() { Leave(); }
-
-bool Participant::Submit(uint64_t sequence,
-                         const absl::StatusOr<PoseUpdate>& update,
-                         uint64_t rig_changes) {
-  Session& session = *session_;
-  MutexLock lock(session.mutex_);
-  const auto found = session.seats_.find(seat_);
-  if (found == session.seats_.end() || session.closed_) return false;
-  Session::Seat& seat = found->second;
-  const absl::StatusOr<PoseUpdate> checked =
-      session.CheckPose(seat, sequence, update, rig_changes);
-  if (!checked.ok()) {
-    seat.outbox.Reject(sequence, checked.status());
-    return false;
-  }
-  seat.last_sequence = sequence;
-  seat.outbox.Expect(sequence);
-  session.queue_.Push({.participant = seat_, .sequence = sequence}, *checked,
-                      seat.outbox.delivery() == Delivery::kEvery);
-  session.Schedule();
-  return true;
+  rig_history_.Add(step.change);
+  audience_.Announce(step.change);
 }
 
 absl::StatusOr<PoseUpdate> Session::CheckPose(
-    const Seat& seat, uint64_t sequence,
+    const Sender& sender, uint64_t sequence,
     const absl::StatusOr<PoseUpdate>& update, uint64_t rig_changes) const {
-  if (sequence <= seat.last_sequence) {
+  if (sequence <= sender.last_sequence) {
     return InvalidInput(
         "SEQUENCE_NOT_RISING", "pose.sequence",
         absl::StrCat("pose ", sequence, " comes after pose ",
-                     seat.last_sequence, "; sequences rise from 1"));
+                     sender.last_sequence, "; sequences rise from 1"));
   }
   if (!update.ok()) return update.status();
-  const uint64_t changes = change_count_ - seat.first_change;
+  const uint64_t changes = rig_history_.count() - sender.first_change;
   if (rig_changes > changes) {
     return InvalidInput(
         "RIG_UNKNOWN", "pose.rig_changes",
         absl::StrCat("pose.rig_changes is ", rig_changes,
                      ", but this stream was told of ", changes));
   }
-  if (rig_changes < changes) return TakeOver(*update, changes - rig_changes);
+  if (rig_changes < changes) {
+    return rig_history_.TakeOver(*update, changes - rig_changes);
+  }
   DEFORM_RETURN_IF_ERROR(CheckPoseUpdate(*update, binding_->rig()));
   return *update;
-}
-
-absl::StatusOr<PoseUpdate> Session::TakeOver(PoseUpdate update,
-                                             uint64_t changes) const {
-  if (changes > changes_.size()) {
-    return InvalidInput(
-        "RIG_CHANGED", "pose.rig_changes",
-        absl::StrCat("the rig has changed ", changes,
-                     " times since the one that this pose is for: read "
-                     "rig_changed"));
-  }
-  for (auto change = changes_.end() - static_cast<int64_t>(changes);
-       change != changes_.end(); ++change) {
-    const PoseTransfer& transfer = (*change)->transfer;
-    const absl::Status status = CheckPoseUpdate(update, transfer.from());
-    if (!status.ok()) {
-      return Annotate(status,
-                      absl::StrCat("the rig has changed, and this pose is not "
-                                   "for the new one (rig_changes): "));
-    }
-    DEFORM_ASSIGN_OR_RETURN(update, transfer.Transfer(update));
-  }
-  return update;
-}
-
-bool Participant::WantsPoses() const {
-  MutexLock lock(session_->mutex_);
-  const auto found = session_->seats_.find(seat_);
-  if (found == session_->seats_.end() || session_->closed_) return false;
-  const Outbox& outbox = found->second.outbox;
-  return outbox.has_room_for_rejections() &&
-         (outbox.delivery() != Delivery::kEvery ||
-          session_->queue_.OwnStepsOf(seat_) < Session::kMaxOwnSteps);
-}
-
-void Participant::HalfClose() {
-  MutexLock lock(session_->mutex_);
-  const auto found = session_->seats_.find(seat_);
-  if (found == session_->seats_.end()) return;
-  found->second.outbox.EndWhenAnswered(absl::OkStatus());
-}
-
-std::optional<Outgoing> Participant::Take() {
-  MutexLock lock(session_->mutex_);
-  const auto found = session_->seats_.find(seat_);
-  if (found == session_->seats_.end()) return std::nullopt;
-  Session::Seat& seat = found->second;
-  std::optional<Outgoing> next = seat.outbox.Take();
-  seat.sending_since.reset();
-  if (next) seat.sending_since = session_->environment_.clock();
-  session_->Schedule();
-  return next;
-}
-
-void Participant::Progressed() {
-  MutexLock lock(session_->mutex_);
-  const auto found = session_->seats_.find(seat_);
-  if (found == session_->seats_.end()) return;
-  found->second.sending_since = session_->environment_.clock();
-}
-
-absl::Status Participant::CheckStall() const {
-  const SessionEnvironment& environment = session_->environment_;
-  const auto now = environment.clock();
-  MutexLock lock(session_->mutex_);
-  const auto found = session_->seats_.find(seat_);
-  if (found == session_->seats_.end()) return absl::OkStatus();
-  const auto& since = found->second.sending_since;
-  if (!since || now - *since <= environment.stall_timeout) {
-    return absl::OkStatus();
-  }
-  return MakeError(
-      absl::StatusCode::kAborted,
-      absl::StrCat("the stream took no message for ",
-                   environment.stall_timeout.count() / 1000.0,
-                   " s (stall-timeout): read faster, or join again"),
-      {.reason = "RECEIVER_STALLED", .field = "stall-timeout"});
-}
-
-void Participant::Leave() {
-  MutexLock lock(session_->mutex_);
-  session_->seats_.erase(seat_);
-  session_->Schedule();
 }
 
 }  // namespace deform::server

@@ -20,27 +20,19 @@
 #include "core/deform/deformer.h"
 #include "core/frames/encoding.h"
 #include "server/models/binding_registry.h"
+#include "server/sessions/audience.h"
 #include "server/sessions/batch_scheduler.h"
 #include "server/sessions/frame.h"
 #include "server/sessions/outbox.h"
+#include "server/sessions/participant.h"
 #include "server/sessions/pose_queue.h"
 #include "server/sessions/rig_change.h"
+#include "server/sessions/rig_history.h"
 
 namespace deform::server {
 
-class Session;
-
 // Never goes back; tests pass their own.
 using Clock = std::function<std::chrono::steady_clock::time_point()>;
-
-// Where a participant's frames go: the other end of a stream. Called on any
-// thread, with no lock of the session held; must not block.
-class Receiver {
- public:
-  virtual ~Receiver() = default;
-  // There may be something to take, or room for poses again.
-  virtual void Wake() = 0;
-};
 
 // What all sessions of a server share. The scheduler is borrowed.
 struct SessionEnvironment {
@@ -62,49 +54,6 @@ struct SessionState {
   absl::Time create_time;
 };
 
-// A place in a session. Leaves when it goes. Thread-safe.
-class Participant {
- public:
-  ~Participant();
-  Participant(const Participant&) = delete;
-  Participant& operator=(const Participant&) = delete;
-
-  const Session& session() const { return *session_; }
-
-  // Accepts the pose, or puts a rejection into the outbox. `rig_changes`: how
-  // many RigChanged its sender knew of; what is meant for an older rig is taken
-  // over (PoseTransfer). Rejected are, beside an `update` that is a status,
-  // what CheckPoseUpdate() and PoseTransfer refuse and InvalidArgument
-  // SEQUENCE_NOT_RISING, RIG_CHANGED (too often), RIG_UNKNOWN (not yet so
-  // often). Needs WantsPoses(). True if it was accepted.
-  bool Submit(uint64_t sequence, const absl::StatusOr<PoseUpdate>& update,
-              uint64_t rig_changes = 0);
-  // False while as many of its poses or rejections wait as may. The receiver
-  // is woken when that changes.
-  bool WantsPoses() const;
-  // No more poses come; the stream ends OK once those that came are answered.
-  void HalfClose();
-
-  // The next to be sent; what was taken before has been sent. Nothing: the
-  // receiver will be woken.
-  std::optional<Outgoing> Take();
-  // Part of what was taken has been sent.
-  void Progressed();
-  // Aborted RECEIVER_STALLED if the same message has been under way for longer
-  // than the stall timeout: then it is to leave.
-  absl::Status CheckStall() const;
-  // Gives up the place. Others no longer wait for it.
-  void Leave();
-
- private:
-  friend class Session;
-  Participant(std::shared_ptr<Session> session, int64_t seat)
-      : session_(std::move(session)), seat_(seat) {}
-
-  const std::shared_ptr<Session> session_;
-  const int64_t seat_;
-};
-
 // Poses merge into a queue of steps; a step is run by the scheduler, one at a
 // time: the deformer moves, the revision rises, the frame is encoded once per
 // encoding in use and offered to every participant. Thread-safe; the lock is
@@ -113,8 +62,6 @@ class Session : public std::enable_shared_from_this<Session> {
  public:
   // A participant's poses that may wait with Delivery::kEvery.
   static constexpr int64_t kMaxOwnSteps = 4;
-  // Changes of the rig over which poses are taken.
-  static constexpr size_t kMaxRigChanges = 16;
 
   // Starts at the rest pose, revision 0.
   static std::shared_ptr<Session> Create(std::string id, BindingInUse binding,
@@ -186,19 +133,12 @@ class Session : public std::enable_shared_from_this<Session> {
 
  private:
   friend class Participant;
-  using TimePoint = std::chrono::steady_clock::time_point;
-  using Frames = std::map<const FrameEncoding*, std::shared_ptr<const Frame>>;
-  using Receivers = std::vector<std::weak_ptr<Receiver>>;
+  using Receivers = Audience::Receivers;
 
-  struct Seat {
-    Outbox outbox;
-    const FrameEncoding* encoding = nullptr;
-    std::weak_ptr<Receiver> receiver;
+  // What is known of who sends poses from a seat of the audience.
+  struct Sender {
     uint64_t first_change = 0;   // Changes of the rig before it joined.
     uint64_t last_sequence = 0;  // Of the poses accepted.
-    uint64_t contained = 0;      // Newest pose that the revision contains.
-    bool needs_frame = false;    // Has no frame of the revision to come.
-    std::optional<TimePoint> sending_since;
   };
 
   Session(std::string id, BindingInUse binding,
@@ -207,23 +147,20 @@ class Session : public std::enable_shared_from_this<Session> {
 
   SessionState StateLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // The update as it is for the present rig.
-  absl::StatusOr<PoseUpdate> CheckPose(const Seat& seat, uint64_t sequence,
+  absl::StatusOr<PoseUpdate> CheckPose(const Sender& sender, uint64_t sequence,
                                        const absl::StatusOr<PoseUpdate>& update,
                                        uint64_t rig_changes) const
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  absl::StatusOr<PoseUpdate> TakeOver(PoseUpdate update, uint64_t changes) const
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool CanMove() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool CanStep() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  bool NeedsFrame() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Schedule() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  Receivers ReceiversLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  static void Wake(const Receivers& receivers);
 
   absl::Status ChangeRig(Step& step, ThreadPool* pool);
   void ChangeForm(Step& step, ThreadPool* pool);
   void Describe(const Pose& pose, const DeformReport& report,
                 std::chrono::microseconds time);
-  Receivers Publish(Step& step, Frames frames);
+  Receivers Publish(Step& step, Audience::Frames frames);
   void PublishChange(Step& step) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
 
   const std::string id_;
@@ -245,17 +182,14 @@ class Session : public std::enable_shared_from_this<Session> {
   // The same weights in another form, to be changed over to.
   std::shared_ptr<const Binding> refreshed_ ABSL_GUARDED_BY(mutex_);
   std::deque<RigMove> moves_ ABSL_GUARDED_BY(mutex_);
-  // The last of all changes of the rig.
-  std::deque<std::shared_ptr<const RigChange>> changes_ ABSL_GUARDED_BY(mutex_);
-  uint64_t change_count_ ABSL_GUARDED_BY(mutex_) = 0;
+  RigHistory rig_history_ ABSL_GUARDED_BY(mutex_);
   PoseQueue queue_ ABSL_GUARDED_BY(mutex_);
   bool scheduled_ ABSL_GUARDED_BY(mutex_) = false;
   uint64_t revision_ ABSL_GUARDED_BY(mutex_) = 0;
-  Pose pose_ ABSL_GUARDED_BY(mutex_);      // Of the revision.
-  Frames frames_ ABSL_GUARDED_BY(mutex_);  // Of the revision.
+  Pose pose_ ABSL_GUARDED_BY(mutex_);  // Of the revision.
   std::optional<absl::Status> closed_ ABSL_GUARDED_BY(mutex_);
-  std::map<int64_t, Seat> seats_ ABSL_GUARDED_BY(mutex_);
-  int64_t next_seat_ ABSL_GUARDED_BY(mutex_) = 1;
+  Audience audience_ ABSL_GUARDED_BY(mutex_);
+  std::map<int64_t, Sender> senders_ ABSL_GUARDED_BY(mutex_);  // By seat.
 };
 
 }  // namespace deform::server

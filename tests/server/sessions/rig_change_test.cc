@@ -342,12 +342,12 @@ TEST_F(RigChangeTest, TakesPosesOverManyChangesButNotAnyNumber) {
     TakeChange(stream);
     stream.TakeFrame();
   };
-  for (uint64_t i = 0; i < Session::kMaxRigChanges; ++i) change_once(i);
+  for (uint64_t i = 0; i < RigHistory::kMaxChanges; ++i) change_once(i);
   stream.participant->Submit(1, MoveVertex(8, {0.3, 0.1, 0.2}), 0);
   executor_.RunAll();
   EXPECT_EQ(stream.TakeFrame().answers_sequence, 1u);
   EXPECT_EQ(PoseOfSession().vertices.row(8), Eigen::RowVector3d(0.3, 0.1, 0.2));
-  change_once(Session::kMaxRigChanges);
+  change_once(RigHistory::kMaxChanges);
   stream.participant->Submit(2, MoveVertex(8, {0.3, 0.1, 0.2}), 0);
   const absl::Status status =
       std::get<Rejection>(stream.participant->Take().value()).status;

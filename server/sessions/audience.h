@@ -1,0 +1,95 @@
+// Those who receive a session's frames: who sits there, what waits for each,
+// and the frames of the present revision.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "core/frames/encoding.h"
+#include "server/sessions/frame.h"
+#include "server/sessions/outbox.h"
+#include "server/sessions/rig_change.h"
+
+namespace deform::server {
+
+// Where a participant's frames go: the other end of a stream. Called on any
+// thread, with no lock of the session held; must not block.
+class Receiver {
+ public:
+  virtual ~Receiver() = default;
+  // There may be something to take, or room for poses again.
+  virtual void Wake() = 0;
+};
+
+// Not thread-safe. A seat that is not there (any more) takes nothing in.
+class Audience {
+ public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+  using Receivers = std::vector<std::weak_ptr<Receiver>>;
+  using Frames = std::map<const FrameEncoding*, std::shared_ptr<const Frame>>;
+
+  // Gives a seat, which gets a frame of the present revision: at once if there
+  // is one, else it needs one.
+  int64_t Add(Delivery delivery, const FrameEncoding& encoding,
+              std::weak_ptr<Receiver> receiver);
+  void Remove(int64_t seat) { seats_.erase(seat); }
+  int size() const { return static_cast<int>(seats_.size()); }
+  // Null if there is none. Its frames come by Publish() and go by Take().
+  Outbox* Find(int64_t seat);
+
+  // Everybody has room for the frame of a next revision.
+  bool HasRoom() const;
+  // And for a change of the rig before it.
+  bool HasRoomForRigChange() const;
+  // Somebody has no frame of the present revision to come.
+  bool NeedsFrame() const;
+  // The encodings in use: by those who need a frame, or by all.
+  std::vector<const FrameEncoding*> Wanted(bool by_all) const;
+
+  // The revision that is published next contains this pose of the seat's.
+  void Contain(int64_t seat, uint64_t sequence);
+  // Frames that are published from now on are of the changed rig. Needs
+  // HasRoomForRigChange().
+  void Announce(const std::shared_ptr<const RigChange>& change);
+  // Frames of the present revision, or of the next, for which there is room.
+  // Everybody gets one of it, as far as it is there; others need one.
+  void Publish(uint64_t revision, Frames frames);
+
+  // See Outbox.
+  void EndNow(const absl::Status& status);
+  void EndWhenAnswered(const absl::Status& status);
+
+  // What the seat is to be sent next; what it took before has been sent.
+  std::optional<Outgoing> Take(int64_t seat, TimePoint now);
+  // Part of what it took has been sent.
+  void Progressed(int64_t seat, TimePoint now);
+  // Since when it takes no message; none if nothing is under way.
+  std::optional<TimePoint> WaitingSince(int64_t seat) const;
+
+  Receivers receivers() const;
+
+ private:
+  struct Seat {
+    Outbox outbox;
+    const FrameEncoding* encoding = nullptr;
+    std::weak_ptr<Receiver> receiver;
+    uint64_t contained = 0;  // Newest pose that the revision contains.
+    bool needs_frame = false;
+    std::optional<TimePoint> waiting_since;
+  };
+
+  // Gives the seat its frame of the present revision.
+  void Serve(Seat& seat);
+
+  std::map<int64_t, Seat> seats_;
+  int64_t next_seat_ = 1;
+  uint64_t revision_ = 0;
+  Frames frames_;  // Of the revision.
+};
+
+}  // namespace deform::server

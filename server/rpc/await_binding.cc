@@ -6,14 +6,12 @@ namespace deform::server {
 
 absl::StatusOr<CreatedBinding> AwaitBinding(
     BindingRegistry::Waiter& waiter, const grpc::ServerContext& context,
-    CallRunner::Watch& watch,
     absl::FunctionRef<bool(const BindProgress&)> tell) {
   int64_t told = -1;
   auto told_at = std::chrono::steady_clock::now() - kProgressInterval;
   for (;;) {
     if (auto outcome = waiter.Wait(kPollInterval)) return *std::move(outcome);
     if (context.IsCancelled()) return absl::CancelledError();
-    watch.Progressed();
     const auto now = std::chrono::steady_clock::now();
     const BindProgress progress = waiter.progress();
     if (progress.points_done == told || now - told_at < kProgressInterval) {

@@ -7,7 +7,6 @@
 #include "absl/status/statusor.h"
 #include "grpcpp/server_context.h"
 #include "server/models/binding_registry.h"
-#include "server/rpc/calls.h"
 
 namespace deform::server {
 
@@ -23,6 +22,6 @@ inline constexpr std::chrono::milliseconds kPollInterval{20};
 // not.
 absl::StatusOr<CreatedBinding> AwaitBinding(
     BindingRegistry::Waiter& waiter, const grpc::ServerContext& context,
-    CallRunner::Watch& watch, absl::FunctionRef<bool(const BindProgress&)> tell);
+    absl::FunctionRef<bool(const BindProgress&)> tell);
 
 }  // namespace deform::server

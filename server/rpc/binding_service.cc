@@ -15,12 +15,12 @@
 namespace deform::server {
 namespace {
 
-using BindingWriter = grpc::ServerWriter<v1::CreateBindingResponse>;
+using BindingWriter = PeerWriter<v1::CreateBindingResponse>;
 
-bool WriteProgress(const BindProgress& progress, BindingWriter& writer) {
+bool WriteProgress(const BindProgress& progress, BindingWriter& peer) {
   v1::CreateBindingResponse message;
   ToProto(progress, message.mutable_progress());
-  return writer.Write(message);
+  return peer.Write(message);
 }
 
 // The rows of `range`, computed at the priority of `pool`.
@@ -37,10 +37,8 @@ absl::StatusOr<v1::GetWeightsResponse> RowsAgain(const BindingFacts& binding,
 // Measures with the priority of `pool`, telling progress. What the task refers
 // to is the caller's, so a caller who has left is waited for: a block of points
 // at most.
-absl::StatusOr<Quality> Measure(
-    const QualityTask& what, ThreadPool& pool, grpc::ServerContext& context,
-    CallRunner::Watch& watch,
-    grpc::ServerWriter<v1::GetQualityResponse>& writer) {
+absl::StatusOr<Quality> Measure(const QualityTask& what, ThreadPool& pool,
+                                PeerWriter<v1::GetQualityResponse>& peer) {
   Cancellation cancellation;
   std::atomic<int64_t> points_done = 0;
   const auto task =
@@ -53,8 +51,7 @@ absl::StatusOr<Quality> Measure(
   pool.Submit([task] { (*task)(); });
   auto told_at = std::chrono::steady_clock::now() - kProgressInterval;
   while (quality.wait_for(kPollInterval) != std::future_status::ready) {
-    if (context.IsCancelled()) cancellation.Cancel();
-    watch.Progressed();
+    if (peer.IsGone()) cancellation.Cancel();
     const auto now = std::chrono::steady_clock::now();
     if (!what.posed || now - told_at < kProgressInterval) continue;
     told_at = now;
@@ -62,7 +59,7 @@ absl::StatusOr<Quality> Measure(
     message.mutable_progress()->set_points_done(points_done);
     message.mutable_progress()->set_points_total(
         PointsToMeasure(what.facts, *what.posed));
-    if (!writer.Write(message)) cancellation.Cancel();
+    if (!peer.Write(message)) cancellation.Cancel();
   }
   return quality.get();
 }
@@ -96,24 +93,23 @@ absl::StatusOr<std::shared_ptr<const Mesh>> BindingService::BoxedModel(
 
 grpc::Status BindingService::CreateBinding(
     grpc::ServerContext* context, const v1::CreateBindingRequest* request,
-    BindingWriter* writer) {
+    grpc::ServerWriter<v1::CreateBindingResponse>* writer) {
   return calls_.Run("CreateBinding", *context, [&]() -> absl::Status {
-    CallRunner::Watch watch(calls_, *context);
+    BindingWriter peer(calls_, *context, *writer);
     DEFORM_ASSIGN_OR_RETURN(const auto model, BoxedModel(*request));
     DEFORM_ASSIGN_OR_RETURN(
         BindSpec spec, FromProto(*request, model.get(), weight_tolerance_));
     DEFORM_ASSIGN_OR_RETURN(const auto waiter,
                             bindings_.Create(std::move(spec)));
-    DEFORM_ASSIGN_OR_RETURN(const CreatedBinding created,
-                            AwaitBinding(*waiter, *context, watch,
-                                         [&](const BindProgress& progress) {
-                                           return WriteProgress(progress,
-                                                                *writer);
-                                         }));
+    DEFORM_ASSIGN_OR_RETURN(
+        const CreatedBinding created,
+        AwaitBinding(*waiter, *context, [&](const BindProgress& progress) {
+          return WriteProgress(progress, peer);
+        }));
     v1::CreateBindingResponse message;
     Describe(*created.record, Detail::kFull, message.mutable_binding());
     message.mutable_binding()->set_existed(created.existed);
-    writer->Write(message);
+    peer.Write(message);
     return absl::OkStatus();
   });
 }
@@ -171,16 +167,13 @@ grpc::Status BindingService::GetWeights(
     grpc::ServerContext* context, const v1::GetWeightsRequest* request,
     grpc::ServerWriter<v1::GetWeightsResponse>* writer) {
   return calls_.Run("GetWeights", *context, [&]() -> absl::Status {
-    CallRunner::Watch watch(calls_, *context);
+    PeerWriter<v1::GetWeightsResponse> peer(calls_, *context, *writer);
     DEFORM_ASSIGN_OR_RETURN(const std::string tenant,
                             TenantOr(request->tenant()));
     DEFORM_ASSIGN_OR_RETURN(
         const auto record,
         bindings_.catalogue().Find(tenant, request->binding_id()));
-    const auto is_wanted = [&] {
-      watch.Progressed();
-      return !context->IsCancelled();
-    };
+    const auto is_wanted = [&] { return !peer.IsGone(); };
     const bool again =
         request->precision() == v1::WEIGHT_PRECISION_RECOMPUTED_FLOAT64;
     DEFORM_ASSIGN_OR_RETURN(PointRange left,
@@ -198,9 +191,7 @@ grpc::Status BindingService::GetWeights(
                               again
                                   ? RowsAgain(record->facts, block, background_)
                                   : CachedRows(*cached, block));
-      watch.Progressed();
-      if (!writer->Write(rows)) return absl::CancelledError();
-      watch.Progressed();
+      if (!peer.Write(rows)) return absl::CancelledError();
       left.first += block.count;
       left.count -= block.count;
     }
@@ -212,7 +203,7 @@ grpc::Status BindingService::GetQuality(
     grpc::ServerContext* context, const v1::GetQualityRequest* request,
     grpc::ServerWriter<v1::GetQualityResponse>* writer) {
   return calls_.Run("GetQuality", *context, [&]() -> absl::Status {
-    CallRunner::Watch watch(calls_, *context);
+    PeerWriter<v1::GetQualityResponse> peer(calls_, *context, *writer);
     DEFORM_ASSIGN_OR_RETURN(const std::string tenant,
                             TenantOr(request->tenant()));
     DEFORM_ASSIGN_OR_RETURN(
@@ -222,23 +213,20 @@ grpc::Status BindingService::GetQuality(
         QualityTask task, ToQualityTask(*request, tenant, *record, sessions_));
     if (task.posed) {
       DEFORM_ASSIGN_OR_RETURN(task.binding, bindings_.WeightsOf(record, [&] {
-        watch.Progressed();
-        return !context->IsCancelled();
+        return !peer.IsGone();
       }));
     }
-    DEFORM_ASSIGN_OR_RETURN(
-        const Quality quality,
-        Measure(task, background_, *context, watch, *writer));
+    DEFORM_ASSIGN_OR_RETURN(const Quality quality,
+                            Measure(task, background_, peer));
     v1::GetQualityResponse message;
     *message.mutable_report() = ToProto(quality);
-    if (!writer->Write(message)) return absl::CancelledError();
+    if (!peer.Write(message)) return absl::CancelledError();
     const int64_t points = request->with_points() && quality.pose
                                ? std::ssize(quality.pose->points)
                                : 0;
     for (int64_t i = 0; i < points; i += kQualityPointsPerMessage) {
       *message.mutable_points() = ToProto(*quality.pose, i);
-      watch.Progressed();
-      if (!writer->Write(message)) return absl::CancelledError();
+      if (!peer.Write(message)) return absl::CancelledError();
     }
     return absl::OkStatus();
   });

@@ -61,27 +61,22 @@ void LogCall(absl::string_view call, const std::string& peer,
                ms, peer, std::string(status.message()));
 }
 
-CallRunner::Watch::Watch(CallRunner& calls, grpc::ServerContext& context)
-    : calls_(calls), context_(context), progress_(calls.clock_()) {
+CallRunner::PeerWait::PeerWait(CallRunner& calls, grpc::ServerContext& context)
+    : calls_(calls), context_(context), since_(calls.clock_()) {
   MutexLock lock(calls_.mutex_);
-  calls_.watches_.insert(this);
+  calls_.waits_.insert(this);
 }
 
-CallRunner::Watch::~Watch() {
+CallRunner::PeerWait::~PeerWait() {
   MutexLock lock(calls_.mutex_);
-  calls_.watches_.erase(this);
-}
-
-void CallRunner::Watch::Progressed() {
-  MutexLock lock(calls_.mutex_);
-  progress_ = calls_.clock_();
+  calls_.waits_.erase(this);
 }
 
 void CallRunner::CheckStalls() {
   const auto now = clock_();
   MutexLock lock(mutex_);
-  for (const Watch* watch : watches_) {
-    if (now - watch->progress_ > stall_timeout_) watch->context_.TryCancel();
+  for (const PeerWait* wait : waits_) {
+    if (now - wait->since_ > stall_timeout_) wait->context_.TryCancel();
   }
 }
 

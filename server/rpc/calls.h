@@ -12,11 +12,13 @@
 #include "core/base/mutex.h"
 #include "grpcpp/server_context.h"
 #include "grpcpp/support/status.h"
+#include "grpcpp/support/sync_stream.h"
 #include "server/sessions/session.h"
 
 namespace deform::server {
 
-// Runs the bodies of calls and watches those that stream. Thread-safe.
+// Runs the bodies of calls, and ends those whose peer stands still.
+// Thread-safe.
 class CallRunner {
  public:
   CallRunner(Clock clock, std::chrono::milliseconds stall_timeout)
@@ -32,22 +34,20 @@ class CallRunner {
   // Calls that are running.
   int active() const;
 
-  // A stream whose peer may stop reading or sending while a thread waits for
-  // it: without a sign of life for the stall timeout the call is cancelled.
-  class Watch {
+  // While it lives, a thread waits for the peer of a call to read or to send.
+  // If that takes longer than the stall timeout the call is cancelled.
+  class PeerWait {
    public:
-    Watch(CallRunner& calls, grpc::ServerContext& context);
-    ~Watch();
-    Watch(const Watch&) = delete;
-    Watch& operator=(const Watch&) = delete;
-
-    void Progressed();
+    PeerWait(CallRunner& calls, grpc::ServerContext& context);
+    ~PeerWait();
+    PeerWait(const PeerWait&) = delete;
+    PeerWait& operator=(const PeerWait&) = delete;
 
    private:
     friend class CallRunner;
     CallRunner& calls_;
     grpc::ServerContext& context_;
-    std::chrono::steady_clock::time_point progress_;  // Guarded by calls_.
+    const std::chrono::steady_clock::time_point since_;
   };
 
   // Call it a few times a second.
@@ -62,7 +62,48 @@ class CallRunner {
   mutable Mutex mutex_;
   std::optional<absl::Status> refusal_ ABSL_GUARDED_BY(mutex_);
   int active_ ABSL_GUARDED_BY(mutex_) = 0;
-  std::set<Watch*> watches_ ABSL_GUARDED_BY(mutex_);
+  std::set<const PeerWait*> waits_ ABSL_GUARDED_BY(mutex_);
+};
+
+// A stream to the peer of a call. Both are borrowed.
+template <typename Message>
+class PeerWriter {
+ public:
+  PeerWriter(CallRunner& calls, grpc::ServerContext& context,
+             grpc::ServerWriter<Message>& writer)
+      : calls_(calls), context_(context), writer_(writer) {}
+
+  // False: the peer is gone, or did not read for the stall timeout.
+  bool Write(const Message& message) {
+    const CallRunner::PeerWait wait(calls_, context_);
+    return writer_.Write(message);
+  }
+  bool IsGone() const { return context_.IsCancelled(); }
+
+ private:
+  CallRunner& calls_;
+  grpc::ServerContext& context_;
+  grpc::ServerWriter<Message>& writer_;
+};
+
+// A stream from the peer of a call. Both are borrowed.
+template <typename Message>
+class PeerReader {
+ public:
+  PeerReader(CallRunner& calls, grpc::ServerContext& context,
+             grpc::ServerReader<Message>& reader)
+      : calls_(calls), context_(context), reader_(reader) {}
+
+  // False: the stream has ended, or nothing came for the stall timeout.
+  bool Read(Message* message) {
+    const CallRunner::PeerWait wait(calls_, context_);
+    return reader_.Read(message);
+  }
+
+ private:
+  CallRunner& calls_;
+  grpc::ServerContext& context_;
+  grpc::ServerReader<Message>& reader_;
 };
 
 // One log line about a call that has ended.

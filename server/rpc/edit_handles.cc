@@ -16,8 +16,6 @@
 namespace deform::server {
 namespace {
 
-using EditWriter = grpc::ServerWriter<v1::EditHandlesResponse>;
-
 absl::StatusOr<const Handles*> HandlesOf(const BindingFacts& binding,
                                          const std::string& id) {
   const auto* handles = std::get_if<Handles>(&binding.rig());
@@ -61,15 +59,12 @@ void Tell(const RigMoves& moves, v1::HandlesEdited* out) {
 
 }  // namespace
 
-grpc::Status BindingService::EditHandles(grpc::ServerContext* context,
-                                         const v1::EditHandlesRequest* request,
-                                         EditWriter* writer) {
+grpc::Status BindingService::EditHandles(
+    grpc::ServerContext* context, const v1::EditHandlesRequest* request,
+    grpc::ServerWriter<v1::EditHandlesResponse>* writer) {
   return calls_.Run("EditHandles", *context, [&]() -> absl::Status {
-    CallRunner::Watch watch(calls_, *context);
-    const auto keep_waiting = [&] {
-      watch.Progressed();
-      return !context->IsCancelled();
-    };
+    PeerWriter<v1::EditHandlesResponse> peer(calls_, *context, *writer);
+    const auto keep_waiting = [&] { return !peer.IsGone(); };
     DEFORM_ASSIGN_OR_RETURN(const EditRequest wanted, FromProto(*request));
     DEFORM_RETURN_IF_ERROR(
         sessions_.CheckHave(wanted.tenant, wanted.sessions, wanted.binding_id));
@@ -90,10 +85,10 @@ grpc::Status BindingService::EditHandles(grpc::ServerContext* context,
                                                     old.binding->solutions())));
     DEFORM_ASSIGN_OR_RETURN(
         const CreatedBinding created,
-        AwaitBinding(*waiter, *context, watch, [&](const BindProgress& p) {
+        AwaitBinding(*waiter, *context, [&](const BindProgress& p) {
           v1::EditHandlesResponse message;
           ToProto(p, message.mutable_progress());
-          return writer->Write(message);
+          return peer.Write(message);
         }));
     RigMoves moves;
     if (!wanted.keep_sessions && created.record->id != wanted.binding_id) {
@@ -112,7 +107,7 @@ grpc::Status BindingService::EditHandles(grpc::ServerContext* context,
     out->set_iterations_mean(created.record->facts.quality().iterations_mean);
     out->set_iterations_mean_before(old.binding->quality().iterations_mean);
     Tell(moves, out);
-    writer->Write(message);
+    peer.Write(message);
     return absl::OkStatus();
   });
 }

@@ -9,7 +9,7 @@
 namespace deform::server {
 namespace {
 
-using Reader = grpc::ServerReader<v1::RegisterModelRequest>;
+using Reader = PeerReader<v1::RegisterModelRequest>;
 
 absl::StatusOr<v1::ModelHeader> ReadHeader(Reader& reader) {
   v1::RegisterModelRequest message;
@@ -21,14 +21,13 @@ absl::StatusOr<v1::ModelHeader> ReadHeader(Reader& reader) {
 }
 
 absl::StatusOr<Mesh> ReadMesh(const v1::ModelHeader& header, Reader& reader,
-                              ModelRegistry& models, CallRunner::Watch& watch) {
+                              ModelRegistry& models) {
   DEFORM_ASSIGN_OR_RETURN(const ModelUpload::Header counts, FromProto(header));
   DEFORM_ASSIGN_OR_RETURN(
       ModelUpload upload,
       ModelUpload::Create(counts, models.max_model_bytes(), models.budget()));
   v1::RegisterModelRequest message;
   while (reader.Read(&message)) {
-    watch.Progressed();
     if (!message.has_chunk()) {
       return InvalidInput("CHUNK_EXPECTED", "chunk",
                           "after the header an upload has chunks only");
@@ -42,16 +41,16 @@ absl::StatusOr<Mesh> ReadMesh(const v1::ModelHeader& header, Reader& reader,
 
 }  // namespace
 
-grpc::Status ModelService::RegisterModel(grpc::ServerContext* context,
-                                         Reader* reader,
-                                         v1::RegisterModelResponse* response) {
+grpc::Status ModelService::RegisterModel(
+    grpc::ServerContext* context,
+    grpc::ServerReader<v1::RegisterModelRequest>* reader,
+    v1::RegisterModelResponse* response) {
   return calls_.Run("RegisterModel", *context, [&]() -> absl::Status {
-    CallRunner::Watch watch(calls_, *context);
-    DEFORM_ASSIGN_OR_RETURN(const v1::ModelHeader header, ReadHeader(*reader));
+    Reader peer(calls_, *context, *reader);
+    DEFORM_ASSIGN_OR_RETURN(const v1::ModelHeader header, ReadHeader(peer));
     DEFORM_ASSIGN_OR_RETURN(const std::string tenant,
                             TenantOr(header.tenant()));
-    DEFORM_ASSIGN_OR_RETURN(Mesh mesh,
-                            ReadMesh(header, *reader, models_, watch));
+    DEFORM_ASSIGN_OR_RETURN(Mesh mesh, ReadMesh(header, peer, models_));
     // A broken stream ends like a finished one; nothing is kept of it.
     if (context->IsCancelled()) return absl::CancelledError();
     DEFORM_ASSIGN_OR_RETURN(

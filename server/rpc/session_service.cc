@@ -9,15 +9,12 @@ grpc::Status SessionService::CreateSession(
     grpc::ServerContext* context, const v1::CreateSessionRequest* request,
     v1::CreateSessionResponse* response) {
   return calls_.Run("CreateSession", *context, [&]() -> absl::Status {
-    CallRunner::Watch watch(calls_, *context);
     DEFORM_ASSIGN_OR_RETURN(const std::string tenant,
                             TenantOr(request->tenant()));
-    DEFORM_ASSIGN_OR_RETURN(const auto session,
-                            sessions_.Create(tenant, request->binding_id(),
-                                             request->session_id(), [&] {
-                                               watch.Progressed();
-                                               return !context->IsCancelled();
-                                             }));
+    DEFORM_ASSIGN_OR_RETURN(
+        const auto session,
+        sessions_.Create(tenant, request->binding_id(), request->session_id(),
+                         [&] { return !context->IsCancelled(); }));
     ToProto(session->state(), response->mutable_session());
     return absl::OkStatus();
   });

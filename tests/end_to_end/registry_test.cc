@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 #include <zlib.h>
 
+#include <future>
 #include <optional>
 #include <thread>
+#include <utility>
 
 #include "core/base/error.h"
 #include "deform/v1/binding.grpc.pb.h"
@@ -275,6 +277,68 @@ TEST(Bindings, StopAtTheDeadline) {
   }
   EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
   AwaitFree(server.client(), request.model_id());
+}
+
+TEST(Bindings, CutOffWhoDoesNotReadTheirWeights) {
+  server::Options options = TestOptions();
+  options.stall_timeout = {0.2};
+  RunningServer server(options);
+  // 20 MB: more than a connection holds.
+  const ModelInfo model =
+      server.client().RegisterModel(MeshOf(Icosphere(0.5, 5)), "").value();
+  v1::GetWeightsRequest request;
+  request.set_binding_id(server.client()
+                             .CreateBinding({.model_id = model.model_id,
+                                             .rig = CageOf(Icosphere(1, 2))})
+                             .value()
+                             .binding_id);
+  const auto stub = v1::BindingService::NewStub(PlainChannel(server.address()));
+  grpc::ClientContext context;
+  const auto reader = stub->GetWeights(&context, request);
+  v1::GetWeightsResponse response;
+  ASSERT_TRUE(reader->Read(&response));
+  // What is not read is sent no more: no call is left to be waited for.
+  EXPECT_TRUE(server.server().Drain(std::chrono::seconds(60)));
+  while (reader->Read(&response)) {
+  }
+  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
+}
+
+// One thread computes: who asks for weights waits for a report of another.
+TEST(Bindings, DoNotTakeTheirOwnWorkForAPeerThatStands) {
+  server::Options options = TestOptions();
+  options.stall_timeout = {0.1};
+  options.compute_threads = 1;
+  RunningServer server(options);
+  // Differences of mean value coordinates in a cage of 1280 faces: half a
+  // second and more.
+  const ModelInfo model =
+      server.client().RegisterModel(MeshOf(Icosphere(0.5, 3)), "").value();
+  const BindingInfo binding =
+      server.client()
+          .CreateBinding({.model_id = model.model_id,
+                          .rig = CageOf(Icosphere(1, 3)),
+                          .scheme = "mean_value"})
+          .value();
+  std::promise<void> measuring;
+  std::thread reporter([&] {
+    EXPECT_TRUE(
+        server.client()
+            .GetQuality(
+                {.binding_id = binding.binding_id,
+                 .pose = PoseUpdate{.positions = Icosphere(2, 3).positions}},
+                [&, told = false](int64_t, int64_t) mutable {
+                  if (!std::exchange(told, true)) measuring.set_value();
+                  return true;
+                })
+            .ok());
+  });
+  measuring.get_future().wait();
+  EXPECT_EQ(server.client().GetWeights(
+                binding.binding_id, WeightPrecision::kRecomputedFloat64, 0, 1,
+                [](const WeightRows&) { return absl::OkStatus(); }),
+            absl::OkStatus());
+  reporter.join();
 }
 
 // All weights of the binding: N x C.

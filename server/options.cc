@@ -69,6 +69,11 @@ void VisitOptions(SomeOptions& o, Visitor&& visit) {
         "and take about a tenth of the memory and of the time of a pose.");
   visit("max-sessions-memory", o.max_sessions_memory, 1, kMax,
         "Memory of all sessions: about 36 bytes per point.");
+  visit(
+      "max-drags-memory", o.max_drags_memory, 0, kMax,
+      "Memory in which sessions keep copies of the weights that a drag moves, "
+      "besides, for as long as it lasts: they are read as fast as memory "
+      "allows. A drag that finds none left reads the weights, more slowly.");
   visit("max-sessions", o.max_sessions, 1, kMax, "Sessions of all tenants.");
   visit("max-participants", o.max_participants, 1, 100'000,
         "Streams that may join one session.");

@@ -49,6 +49,7 @@ struct Options {
   Tolerance weight_tolerance{1e-5};
 
   Bytes max_sessions_memory{int64_t{4} << 30};
+  Bytes max_drags_memory{int64_t{256} << 20};
   int64_t max_sessions = 1'000;
   int max_participants = 64;
 

@@ -48,8 +48,9 @@ BatchScheduler::Options BatchOptions(ThreadPool& compute) {
 }
 
 SessionEnvironment EnvironmentOf(const Options& options,
-                                 BatchScheduler& scheduler) {
+                                 BatchScheduler& scheduler, Allowance& drags) {
   return {.scheduler = &scheduler,
+          .drags = &drags,
           .clock = [] { return std::chrono::steady_clock::now(); },
           .max_participants = options.max_participants,
           .stall_timeout = options.stall_timeout.milliseconds()};
@@ -72,10 +73,11 @@ struct Server::Parts {
         bindings(models, binds, BindingLimits(options), &Bind,
                  CompressionOptions(compressions)),
         scheduler(BatchOptions(*compute)),
+        drags(options.max_drags_memory.value),
         sessions(bindings,
                  {.memory = options.max_sessions_memory.value,
                   .count = options.max_sessions},
-                 EnvironmentOf(options, scheduler)) {}
+                 EnvironmentOf(options, scheduler, drags)) {}
 
   // Streams end first; then the steps they left behind, which hold sessions;
   // then the rest, from the top down.
@@ -91,6 +93,7 @@ struct Server::Parts {
   ModelRegistry models;
   BindingRegistry bindings;
   BatchScheduler scheduler;
+  Allowance drags;
   SessionManager sessions;
   std::unique_ptr<GrpcServer> grpc;
 };

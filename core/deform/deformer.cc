@@ -14,13 +14,14 @@ constexpr int kMaxSteps = 4096;
 
 }  // namespace
 
-Deformer::Deformer(std::shared_ptr<const Binding> binding, ThreadPool* pool)
+Deformer::Deformer(std::shared_ptr<const Binding> binding, ThreadPool* pool,
+                   Allowance& copies)
     : binding_(std::move(binding)),
       pool_(pool),
       posed_columns_(binding_->rig(), binding_->scheme().uses_normals()),
       pose_(RestPose(binding_->rig())),
       columns_(posed_columns_.rest()),
-      sums_(WeightedSums::Create(*binding_)) {
+      sums_(WeightedSums::Create(*binding_, copies)) {
   if (binding_->compressed() != nullptr) pose_bounds_ = PoseBounds(*binding_);
   if (!binding_->fixed_points().empty()) {
     fixed_.assign(binding_->point_count(), 0);

@@ -14,6 +14,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/allowance.h"
 #include "core/base/thread_pool.h"
 #include "core/deform/affine_map.h"
 #include "core/deform/columns.h"
@@ -47,8 +48,10 @@ class Deformer {
   // and then, so both paths agree to 1e-6 D however many steps were taken.
   enum class Path { kAutomatic, kFull };
 
-  // Starts at the rest pose. `pool` may be null; borrowed.
-  Deformer(std::shared_ptr<const Binding> binding, ThreadPool* pool);
+  // Starts at the rest pose. `pool` may be null. Fast drags take memory of
+  // `copies` (MovedColumns). Both are borrowed.
+  Deformer(std::shared_ptr<const Binding> binding, ThreadPool* pool,
+           Allowance& copies = Unlimited());
 
   // Moves to `pose`, which is right (CheckPoseUpdate).
   DeformReport MoveTo(const Pose& pose, Path path = Path::kAutomatic);

@@ -128,8 +128,8 @@ class DenseSums::PartialStep {
   std::vector<float> column_;
 };
 
-DenseSums::DenseSums(const WeightTiles& weights)
-    : weights_(weights), sums_(weights.tiles() * kTileSums) {}
+DenseSums::DenseSums(const WeightTiles& weights, Allowance& copies)
+    : weights_(weights), sums_(weights.tiles() * kTileSums), moved_(copies) {}
 
 bool DenseSums::PrefersAdding(std::span<const int32_t> columns) const {
   // Scattered columns of large weights take four times as long to read.

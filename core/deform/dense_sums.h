@@ -16,7 +16,8 @@ namespace deform {
 //   now = base + copied columns x what these moved since
 class DenseSums : public WeightedSums {
  public:
-  explicit DenseSums(const WeightTiles& weights);
+  // Drags take memory of `copies`, borrowed.
+  DenseSums(const WeightTiles& weights, Allowance& copies);
   bool PrefersAdding(std::span<const int32_t> columns) const override;
   void Copy(int64_t first, int64_t count, double* out) const override;
 

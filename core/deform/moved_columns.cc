@@ -1,21 +1,10 @@
 #include "core/deform/moved_columns.h"
 
 #include <algorithm>
-#include <atomic>
 #include <iterator>
 
 namespace deform {
 namespace {
-
-std::atomic<int64_t> copied_bytes = 0;  // Of all sessions.
-
-bool Reserve(int64_t bytes) {
-  if (copied_bytes.fetch_add(bytes) + bytes <= MovedColumns::kMaxBytes) {
-    return true;
-  }
-  copied_bytes.fetch_sub(bytes);
-  return false;
-}
 
 // Whether a copy of `have` is good for a step of `wanted`: it is read as a
 // whole, so most of it should be of use.
@@ -41,7 +30,8 @@ bool MovedColumns::Expects(const WeightTiles& weights,
   if (columns.empty() || weights.bytes() < kWorthCopying) return false;
   const int64_t recent = std::ssize(Recent(columns));
   return recent > 0 &&
-         copied_bytes - reserved_ + BytesWith(weights, recent) <= kMaxBytes;
+         allowance_.used() - taken_ + BytesWith(weights, recent) <=
+             allowance_.limit();
 }
 
 bool MovedColumns::Follow(const WeightTiles& weights,
@@ -53,8 +43,8 @@ bool MovedColumns::Follow(const WeightTiles& weights,
     std::vector<int32_t> recent = Recent(columns);
     const int64_t bytes = BytesWith(weights, std::ssize(recent));
     if (partial && !recent.empty() && weights.bytes() >= kWorthCopying &&
-        Reserve(bytes)) {
-      reserved_ = bytes;
+        allowance_.Take(bytes)) {
+      taken_ = bytes;
       copy_ = WeightTiles(weights.points(), std::ssize(recent));
       copied_ = std::move(recent);
       fresh_ = true;
@@ -86,8 +76,8 @@ std::vector<int32_t> MovedColumns::Recent(
 }
 
 void MovedColumns::Drop() {
-  copied_bytes -= reserved_;
-  reserved_ = 0;
+  allowance_.Give(taken_);
+  taken_ = 0;
   copy_ = {};
   copied_.clear();
 }

@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/allowance.h"
 #include "core/kernels/weight_tiles.h"
 
 namespace deform {
@@ -18,13 +19,12 @@ namespace deform {
 // are named by their sorted indices.
 class MovedColumns {
  public:
-  // What all sessions of the process together take for copies, and for the
-  // sums beside them (6 floats a point); who comes too late reads the weights.
-  static constexpr int64_t kMaxBytes = int64_t{256} << 20;
   // Weights of fewer bytes stay in the caches, where no order is slow.
   static constexpr int64_t kWorthCopying = int64_t{4} << 20;
 
-  MovedColumns() = default;
+  // Copies, and the sums beside them (6 floats a point), are taken from
+  // `allowance`, borrowed; who comes too late reads the weights.
+  explicit MovedColumns(Allowance& allowance) : allowance_(allowance) {}
   ~MovedColumns() { Drop(); }
   MovedColumns(const MovedColumns&) = delete;
   MovedColumns& operator=(const MovedColumns&) = delete;
@@ -54,11 +54,12 @@ class MovedColumns {
   std::vector<int32_t> Recent(std::span<const int32_t> columns) const;
   void Drop();
 
+  Allowance& allowance_;
   std::vector<int32_t> last_, before_last_;  // Of the last two steps.
   std::vector<int32_t> copied_;
   WeightTiles copy_;
-  int64_t reserved_ = 0;  // Of kMaxBytes.
-  bool fresh_ = false;    // Allocated in this step: to be filled.
+  int64_t taken_ = 0;   // From the allowance.
+  bool fresh_ = false;  // Allocated in this step: to be filled.
 };
 
 }  // namespace deform

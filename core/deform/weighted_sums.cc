@@ -5,11 +5,12 @@
 
 namespace deform {
 
-std::unique_ptr<WeightedSums> WeightedSums::Create(const Binding& binding) {
+std::unique_ptr<WeightedSums> WeightedSums::Create(const Binding& binding,
+                                                   Allowance& copies) {
   if (const CompressedWeights* compressed = binding.compressed()) {
     return std::make_unique<CompressedSums>(*compressed);
   }
-  return std::make_unique<DenseSums>(binding.weights());
+  return std::make_unique<DenseSums>(binding.weights(), copies);
 }
 
 void ApplyChanges(const Binding& binding, std::span<const SumsChange> changes,

@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 
+#include "core/base/allowance.h"
 #include "core/base/thread_pool.h"
 #include "core/weights/binding.h"
 
@@ -14,7 +15,10 @@ namespace deform {
 // The sums of one session. Starts at 0. Not thread-safe.
 class WeightedSums {
  public:
-  static std::unique_ptr<WeightedSums> Create(const Binding& binding);
+  // What copying columns that move again and again takes comes from `copies`,
+  // borrowed.
+  static std::unique_ptr<WeightedSums> Create(const Binding& binding,
+                                              Allowance& copies);
   virtual ~WeightedSums() = default;
 
   // Whether a step that changes these columns (sorted) should add them; else

@@ -39,7 +39,8 @@ Session::Session(std::string id, BindingInUse binding,
       dimension_(binding.binding->dimension()),
       create_time_(absl::Now()),
       environment_(environment),
-      deformer_(std::make_unique<Deformer>(binding.binding, nullptr)),
+      deformer_(std::make_unique<Deformer>(binding.binding, nullptr,
+                                           *environment.drags)),
       memory_(std::move(memory)),
       lease_(std::move(binding.lease)),
       binding_id_(lease_.record()->id),
@@ -240,7 +241,8 @@ absl::Status Session::ChangeRig(Step& step, ThreadPool* pool) {
       PoseTransfer::Create(deformer_->binding(), *move.to.binding,
                            move.previous, deformer_->pose()));
   const auto begin = std::chrono::steady_clock::now();
-  auto next = std::make_unique<Deformer>(move.to.binding, nullptr);
+  auto next =
+      std::make_unique<Deformer>(move.to.binding, nullptr, *environment_.drags);
   DeformJob job{.deformer = next.get(), .pose = &transfer.pose()};
   MoveTogether({&job, 1}, pool);
   const auto before = std::exchange(deformer_, std::move(next));
@@ -260,7 +262,8 @@ absl::Status Session::ChangeRig(Step& step, ThreadPool* pool) {
 
 void Session::ChangeForm(Step& step, ThreadPool* pool) {
   const Pose pose = deformer_->pose();
-  auto next = std::make_unique<Deformer>(step.refreshed, nullptr);
+  auto next =
+      std::make_unique<Deformer>(step.refreshed, nullptr, *environment_.drags);
   DeformJob job{.deformer = next.get(), .pose = &pose};
   MoveTogether({&job, 1}, pool);
   deformer_ = std::move(next);

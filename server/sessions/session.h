@@ -34,9 +34,10 @@ namespace deform::server {
 // Never goes back; tests pass their own.
 using Clock = std::function<std::chrono::steady_clock::time_point()>;
 
-// What all sessions of a server share. The scheduler is borrowed.
+// What all sessions of a server share. Pointers are borrowed.
 struct SessionEnvironment {
   BatchScheduler* scheduler = nullptr;  // Runs steps.
+  Allowance* drags = &Unlimited();      // Of which fast drags take memory.
   Clock clock;
   int max_participants = 64;
   // How long a receiver may take to send one message.

@@ -211,6 +211,38 @@ TEST(Deformer, DragsEqualFullPasses) {
   EXPECT_GT(added, 60);
 }
 
+TEST(Deformer, DragsShareTheMemoryThereIsForThem) {
+  const auto binding = BindGreen(PointsInside(3, 20000), BoxCage(2));
+  Pose pose = RestPose(binding->rig());
+  const auto drag = [&](Deformer& deformer) {
+    pose = RestPose(binding->rig());
+    for (int step = 0; step < 4; ++step) {
+      pose.vertices.row(0) += Vec3(0.01, 0, 0).transpose();
+      deformer.MoveTo(pose);
+    }
+    return deformer.positions();
+  };
+  Allowance none(0);
+  Deformer without(binding, nullptr, none);
+  const Positions expected = drag(without);
+  EXPECT_EQ(none.used(), 0);
+
+  Allowance any(int64_t{1} << 30);
+  Deformer with(binding, nullptr, any);
+  EXPECT_LT(LargestDifference(drag(with), expected), 1e-6);
+  EXPECT_GT(any.used(), 0);
+
+  Allowance enough(any.used());  // For one of two.
+  {
+    Deformer first(binding, nullptr, enough), second(binding, nullptr, enough);
+    EXPECT_LT(LargestDifference(drag(first), expected), 1e-6);
+    EXPECT_EQ(enough.used(), enough.limit());
+    EXPECT_LT(LargestDifference(drag(second), expected), 1e-6);
+    EXPECT_EQ(enough.used(), enough.limit());
+  }
+  EXPECT_EQ(enough.used(), 0);
+}
+
 TEST(Deformer, FitsAnewWhenStepsHaveCarriedTheCageAway) {
   const auto binding = BindGreen(PointsInside(3, 40), BoxCage(3));
   const double diagonal = DiagonalOf(binding->rig());

@@ -29,7 +29,7 @@ const WeightTiles& Weights() {
 }
 
 TEST(MovedColumns, AreCopiedWhenTheyMoveAgain) {
-  MovedColumns moved;
+  MovedColumns moved(Unlimited());
   EXPECT_FALSE(moved.Expects(Weights(), Columns{3, 7}));
   EXPECT_FALSE(moved.Follow(Weights(), Columns{3, 7}, true));
   EXPECT_TRUE(moved.Expects(Weights(), Columns{3, 7}));
@@ -45,7 +45,7 @@ TEST(MovedColumns, AreCopiedWhenTheyMoveAgain) {
 }
 
 TEST(MovedColumns, ServeStepsThatMoveMostOfThem) {
-  MovedColumns moved;
+  MovedColumns moved(Unlimited());
   moved.Follow(Weights(), Columns{1, 2, 3, 4}, true);
   EXPECT_TRUE(moved.Follow(Weights(), Columns{2, 4}, true));
   EXPECT_THAT(moved.copied(), ElementsAre(1, 2, 3, 4));
@@ -54,7 +54,7 @@ TEST(MovedColumns, ServeStepsThatMoveMostOfThem) {
 }
 
 TEST(MovedColumns, AreForgottenWhenOthersMove) {
-  MovedColumns moved;
+  MovedColumns moved(Unlimited());
   moved.Follow(Weights(), Columns{1}, true);
   moved.Follow(Weights(), Columns{1}, true);
   EXPECT_FALSE(moved.Follow(Weights(), Columns{2, 3, 4}, true));
@@ -64,7 +64,7 @@ TEST(MovedColumns, AreForgottenWhenOthersMove) {
 }
 
 TEST(MovedColumns, OfTwoWhoTakeTurnsAreCopiedTogether) {
-  MovedColumns moved;
+  MovedColumns moved(Unlimited());
   moved.Follow(Weights(), Columns{1, 2}, true);
   moved.Follow(Weights(), Columns{8, 9}, true);
   EXPECT_TRUE(moved.Follow(Weights(), Columns{1, 2}, true));
@@ -73,7 +73,7 @@ TEST(MovedColumns, OfTwoWhoTakeTurnsAreCopiedTogether) {
 }
 
 TEST(MovedColumns, OutliveAFullPassOverTheSameColumns) {
-  MovedColumns moved;
+  MovedColumns moved(Unlimited());
   moved.Follow(Weights(), Columns{1, 2}, true);
   moved.Follow(Weights(), Columns{1, 2}, true);
   moved.Fill(Weights(), 0, Weights().tiles());
@@ -85,7 +85,7 @@ TEST(MovedColumns, OutliveAFullPassOverTheSameColumns) {
 
 TEST(MovedColumns, AreNotCopiedFromSmallWeights) {
   const WeightTiles small(100, kColumns);
-  MovedColumns moved;
+  MovedColumns moved(Unlimited());
   moved.Follow(small, Columns{1}, true);
   EXPECT_FALSE(moved.Expects(small, Columns{1}));
   EXPECT_FALSE(moved.Follow(small, Columns{1}, true));
@@ -95,9 +95,10 @@ TEST(MovedColumns, OfAllSessionsStayWithinTheirAllowance) {
   // Never written, so none of it is real memory.
   const WeightTiles large(3'000'000, 4);
   const Columns columns = {0, 1, 2, 3};  // 48 MB, and 72 MB beside.
+  Allowance two(int64_t{256} << 20);
   std::vector<std::unique_ptr<MovedColumns>> sessions;
   for (int k = 0; k < 3; ++k) {
-    sessions.push_back(std::make_unique<MovedColumns>());
+    sessions.push_back(std::make_unique<MovedColumns>(two));
     sessions[k]->Follow(large, columns, true);
   }
   EXPECT_TRUE(sessions[0]->Follow(large, columns, true));

@@ -69,7 +69,7 @@ class BothForms {
       : dense_(dense),
         compressed_(compressed),
         bounds_(PoseBounds(dense)),
-        sums_(WeightedSums::Create(compressed)) {}
+        sums_(WeightedSums::Create(compressed, Unlimited())) {}
 
   // A component of the largest error, in units of the pose's displacement.
   double Error(const std::vector<double>& displacements) {

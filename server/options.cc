@@ -35,9 +35,12 @@ void VisitOptions(SomeOptions& o, Visitor&& visit) {
         "Where to listen: HOST:PORT (port 0: any free one, told on standard "
         "output) or unix:PATH. Not encrypted: keep it on loopback or a trusted "
         "network.");
+  visit("data-dir", o.data_dir, 0, 0,
+        "Directory in which models, bindings and sessions outlive the server; "
+        "made if it is not there. One server at a time uses it.");
   visit("in-memory", o.in_memory, 0, 0,
-        "State is kept in memory and ends with the server. There is no other "
-        "way yet.");
+        "Keep nothing on disk: all state ends with the server, and data-dir is "
+        "not used.");
   visit("log-level", o.log_level, 0, 0,
         "What is logged to standard error: trace, debug, info, warn, error or "
         "off.");
@@ -240,9 +243,8 @@ absl::Status Check(absl::string_view name, const Tolerance& tolerance,
   return Bad(name, absl::StrCat("must be 0 or between ", smallest, " and ",
                                 largest, ", not ", value));
 }
-absl::Status Check(absl::string_view name, bool value, double, double) {
-  if (value) return absl::OkStatus();
-  return Bad(name, "must be true: state is kept in memory");
+absl::Status Check(absl::string_view, bool, double, double) {
+  return absl::OkStatus();
 }
 absl::Status Check(absl::string_view name, const std::string& value, double,
                    double) {
@@ -252,6 +254,7 @@ absl::Status Check(absl::string_view name, const std::string& value, double,
     return Bad(name, absl::StrCat("is one of ", absl::StrJoin(levels, ", "),
                                   ", not \"", value, "\""));
   }
+  if (name == "data-dir") return absl::OkStatus();  // Tried when it is opened.
   if (absl::StartsWith(value, "unix:") && value.size() > 5) {
     return absl::OkStatus();
   }

@@ -32,7 +32,8 @@ struct Tolerance {
 // What each means is said once, in options.cc, for --help and the file alike.
 struct Options {
   std::string listen = "127.0.0.1:7777";
-  bool in_memory = true;
+  std::string data_dir = "deformd-data";
+  bool in_memory = false;
   std::string log_level = "info";
 
   int compute_threads = 0;

@@ -1,5 +1,8 @@
 #include "server/server.h"
 
+#include <spdlog/spdlog.h>
+
+#include <string>
 #include <utility>
 
 #include "core/base/status_macros.h"
@@ -9,6 +12,7 @@
 #include "server/rpc/grpc_server.h"
 #include "server/sessions/batch_scheduler.h"
 #include "server/sessions/session_manager.h"
+#include "server/stores/store.h"
 
 namespace deform::server {
 namespace {
@@ -17,6 +21,10 @@ namespace {
 constexpr int kBackgroundNiceness = 10;
 // Compressing yields to all else: nobody waits for it.
 constexpr int kCompressionNiceness = 15;
+
+void Warn(const absl::Status& status) {
+  spdlog::warn("{}", std::string(status.message()));
+}
 
 ModelRegistry::Limits ModelLimits(const Options& options) {
   return {.model_bytes = options.max_model_bytes.value,
@@ -38,6 +46,14 @@ Compressor::Options CompressionOptions(ThreadPool& pool) {
       .pool = &pool};
 }
 
+WeightsKeeper::Options KeepingOptions(ThreadPool& writes) {
+  return {.executor =
+              [&writes](std::function<void()> task) {
+                writes.Submit(std::move(task));
+              },
+          .report = [](const absl::Status& status) { Warn(status); }};
+}
+
 BatchScheduler::Options BatchOptions(ThreadPool& compute) {
   return {.executor =
               [&compute](std::function<void()> task) {
@@ -56,12 +72,24 @@ SessionEnvironment EnvironmentOf(const Options& options,
           .stall_timeout = options.stall_timeout.milliseconds()};
 }
 
+absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Options& options) {
+  DEFORM_ASSIGN_OR_RETURN(
+      const StoreKind* kind,
+      FindStoreKind(options.in_memory ? "memory" : "sqlite"));
+  return kind->Open({.directory = options.data_dir});
+}
+
+void Warn(const Losses& losses) {
+  for (const absl::Status& loss : losses) Warn(loss);
+}
+
 }  // namespace
 
 // From the bottom up.
 struct Server::Parts {
-  explicit Parts(const Options& options)
-      : compute(std::make_unique<ThreadPool>(
+  Parts(const Options& options, std::unique_ptr<Store> opened)
+      : store(std::move(opened)),
+        compute(std::make_unique<ThreadPool>(
             ThreadPool::Options{.threads = options.compute_threads})),
         binds({.threads = options.compute_threads,
                .niceness = kBackgroundNiceness}),
@@ -69,15 +97,27 @@ struct Server::Parts {
                     .niceness = kBackgroundNiceness}),
         compressions({.threads = options.compute_threads,
                       .niceness = kCompressionNiceness}),
-        models(ModelLimits(options)),
+        writes({.threads = 1, .niceness = kBackgroundNiceness}),
+        models(ModelLimits(options), *store),
         bindings(models, binds, BindingLimits(options), &Bind,
-                 CompressionOptions(compressions)),
+                 CompressionOptions(compressions), KeepingOptions(writes)),
         scheduler(BatchOptions(*compute)),
         drags(options.max_drags_memory.value),
         sessions(bindings,
                  {.memory = options.max_sessions_memory.value,
                   .count = options.max_sessions},
                  EnvironmentOf(options, scheduler, drags)) {}
+
+  // Before anyone is served.
+  absl::Status Load() {
+    DEFORM_ASSIGN_OR_RETURN(const StoreContents contents, store->Load());
+    Warn(contents.damaged);
+    DEFORM_ASSIGN_OR_RETURN(Losses losses, models.Load(contents.models));
+    Warn(losses);
+    DEFORM_ASSIGN_OR_RETURN(losses, bindings.Load(contents.bindings));
+    Warn(losses);
+    return absl::OkStatus();
+  }
 
   // Streams end first; then the steps they left behind, which hold sessions;
   // then the rest, from the top down.
@@ -86,10 +126,12 @@ struct Server::Parts {
     compute.reset();
   }
 
+  const std::unique_ptr<Store> store;
   std::unique_ptr<ThreadPool> compute;  // Deforming and encoding.
   ThreadPool binds;                     // Weights.
   ThreadPool background;  // Weights again, for those who ask to see them.
   ThreadPool compressions;
+  ThreadPool writes;  // Weights to the store: waits for the disk.
   ModelRegistry models;
   BindingRegistry bindings;
   BatchScheduler scheduler;
@@ -99,7 +141,9 @@ struct Server::Parts {
 };
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Options& options) {
-  auto parts = std::make_unique<Parts>(options);
+  DEFORM_ASSIGN_OR_RETURN(auto store, OpenStore(options));
+  auto parts = std::make_unique<Parts>(options, std::move(store));
+  DEFORM_RETURN_IF_ERROR(parts->Load());
   DEFORM_ASSIGN_OR_RETURN(
       parts->grpc,
       GrpcServer::Start({.listen = options.listen,

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
+#include <utility>
 
 #include "core/kernels/zeroed_array.h"
 
@@ -30,6 +32,17 @@ class Tiles {
       : points_(points),
         columns_(columns),
         data_(TilesOf(points) * columns * kTilePoints) {}
+
+  // Those of somebody else, laid out like ours; see ZeroedArray::Borrow().
+  static Tiles Borrow(int64_t points, int64_t columns, const Number* numbers,
+                      std::shared_ptr<const void> owner) {
+    Tiles tiles;
+    tiles.points_ = points;
+    tiles.columns_ = columns;
+    tiles.data_ = ZeroedArray<Number>::Borrow(
+        numbers, TilesOf(points) * columns * kTilePoints, std::move(owner));
+    return tiles;
+  }
 
   static int64_t TilesOf(int64_t points) {
     return (points + kTilePoints - 1) / kTilePoints;

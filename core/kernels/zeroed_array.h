@@ -3,11 +3,13 @@
 
 #include <sys/mman.h>
 
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
 #include <new>
+#include <utility>
 
 namespace deform {
 
@@ -34,18 +36,34 @@ class ZeroedArray {
     if (wanted >= kWorthHugePages) AskForHugePages(aligned, wanted);
   }
 
+  // `size` numbers of somebody else's, which stay as they are while `owner` or
+  // a copy of it lives; aligned as ours. They are only to be read.
+  static ZeroedArray Borrow(const Number* numbers, int64_t size,
+                            std::shared_ptr<const void> owner) {
+    ZeroedArray array;
+    array.size_ = size;
+    array.data_ = std::unique_ptr<Number[], Free>(
+        const_cast<Number*>(numbers), Free(nullptr, std::move(owner)));
+    return array;
+  }
+
   int64_t size() const { return size_; }
   int64_t bytes() const { return size_ * int64_t{sizeof(Number)}; }
   const Number* data() const { return data_.get(); }
-  Number* data() { return data_.get(); }
+  Number* data() {
+    assert(data_.get_deleter().lender == nullptr);
+    return data_.get();
+  }
 
  private:
-  // Of the block in which the numbers lie aligned.
+  // Of the block in which the numbers lie aligned, or of whose they are.
   struct Free {
-    Free() : block(nullptr) {}
-    explicit Free(void* b) : block(b) {}
+    Free() = default;
+    explicit Free(void* b, std::shared_ptr<const void> l = nullptr)
+        : block(b), lender(std::move(l)) {}
     void operator()(Number* /*data*/) const { std::free(block); }
-    void* block;
+    void* block = nullptr;
+    std::shared_ptr<const void> lender;
   };
 
   static constexpr size_t kWorthHugePages = size_t{8} << 20;

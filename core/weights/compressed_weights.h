@@ -58,6 +58,8 @@ class CompressedWeights {
 
   explicit CompressedWeights(Parts parts);
 
+  // What it was made of.
+  const Parts& parts() const { return parts_; }
   int64_t points() const { return static_cast<int64_t>(parts_.slots.size()); }
   int64_t columns() const { return parts_.columns; }
   int64_t bytes() const { return bytes_; }

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/time/clock.h"
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
 #include "server/models/content_id.h"
@@ -109,14 +108,19 @@ struct BindingRegistry::Job {
 
 BindingRegistry::BindingRegistry(ModelRegistry& models, ThreadPool& pool,
                                  const Limits& limits, BindFunction bind,
-                                 Compressor::Options compression)
+                                 Compressor::Options compression,
+                                 WeightsKeeper::Options keeping)
     : limits_(limits),
       bind_(std::move(bind)),
       models_(models),
       pool_(pool),
       weights_(limits.memory, "max-bindings-memory"),
       bindings_("binding", limits.count, "max-bindings"),
-      compressor_(weights_.budget(), std::move(compression)) {}
+      keeper_(models.store(), std::move(keeping)),
+      compressor_(weights_.budget(), std::move(compression),
+                  [this](const std::shared_ptr<const BindingRecord>& record) {
+                    keeper_.Add(record);
+                  }) {}
 
 BindingRegistry::~BindingRegistry() {
   MutexLock lock(mutex_);
@@ -220,11 +224,7 @@ BindingRegistry::MakeJobFor(const std::shared_ptr<const BindingRecord>& known) {
   if (auto binding = known->weights->Get()) {
     job->points_done = job->points_total;
     job->outcome = CreatedBinding{known, std::move(binding), true};
-    return job;
   }
-  DEFORM_RETURN_IF_ERROR(Reserve(
-      *job, facts.scheme(),
-      "the weights of the binding, evicted since nobody used them, need"));
   return job;
 }
 
@@ -257,14 +257,18 @@ absl::StatusOr<std::shared_ptr<const Binding>> BindingRegistry::WeightsOf(
 
 absl::Status BindingRegistry::Remove(const std::string& tenant,
                                      const std::string& id) {
+  const Claims::Claim claim = claims_.Take(tenant, id);
   {
     std::shared_ptr<const BindingRecord> removed;  // Outlives the lock.
+    DEFORM_ASSIGN_OR_RETURN(removed, bindings_.Remove(tenant, id, [&] {
+      return store().DeleteBinding({tenant, id});
+    }));
     MutexLock lock(mutex_);
-    DEFORM_ASSIGN_OR_RETURN(removed, bindings_.Remove(tenant, id));
-    compressor_.Cancel(*removed);
+    if (removed != nullptr) compressor_.Cancel(*removed);
     // Who waits for weights of a binding that is gone still gets them; who
     // creates it again gets a new one.
-    jobs_.erase(Key(tenant, id));
+    const auto job = jobs_.find(Key(tenant, id));
+    if (job != jobs_.end() && job->second->known == removed) jobs_.erase(job);
   }
   ReturnFreedMemory();
   return absl::OkStatus();
@@ -307,16 +311,9 @@ absl::StatusOr<CreatedBinding> BindingRegistry::Compute(Job& job) try {
   auto model = std::move(job.model);
   auto memory = std::move(job.memory);
   if (job.cancellation.cancelled()) return absl::CancelledError();
+  if (job.known != nullptr) return Restore(job);
   DEFORM_ASSIGN_OR_RETURN(const auto computed, ComputeWeights(job));
   auto weights = memory.Split(computed->weight_bytes());
-  if (job.known != nullptr) {
-    // The facts stay the record's: one copy, and figures that do not change.
-    return CreatedBinding{
-        job.known,
-        job.known->weights->Put(computed->WithFacts(job.known->facts),
-                                std::move(weights)),
-        true};
-  }
   DEFORM_RETURN_IF_ERROR(memory.Resize(computed->bytes(), "the binding needs"));
   const auto record = std::make_shared<const BindingRecord>(
       BindingRecord{.tenant = job.key.first,
@@ -325,18 +322,37 @@ absl::StatusOr<CreatedBinding> BindingRegistry::Compute(Job& job) try {
                     .weight_tolerance = job.weight_tolerance,
                     .facts = *computed,
                     .weights = weights_.MakeSlot(),
-                    .create_time = absl::Now(),
+                    .create_time = TimeToStore(),
                     .memory = std::move(memory),
                     .model = std::move(model)});
-  auto binding = record->weights->Put(computed, std::move(weights));
-  DEFORM_ASSIGN_OR_RETURN(
-      auto inserted, bindings_.Insert(job.key.first, job.key.second, record));
-  return CreatedBinding{std::move(inserted.first), std::move(binding),
-                        inserted.second};
+  return Keep(record, record->weights->Put(computed, std::move(weights)));
 } catch (const std::bad_alloc&) {
   return MakeError(absl::StatusCode::kResourceExhausted,
                    "the machine has no memory left for the computation",
                    {.reason = "OUT_OF_MEMORY", .field = "memory"});
+}
+
+absl::StatusOr<CreatedBinding> BindingRegistry::Restore(Job& job) {
+  const BindingRecord& record = *job.known;
+  const auto put = [&](const Binding& binding,
+                       MemoryBudget::Reservation memory) {
+    // The facts stay the record's: one copy, and figures that do not change.
+    return CreatedBinding{
+        job.known,
+        record.weights->Put(binding.WithFacts(record.facts), std::move(memory)),
+        true};
+  };
+  constexpr absl::string_view kWhat =
+      "the weights of the binding, which are not in memory, need";
+  if (const auto kept = keeper_.Read(record)) {
+    DEFORM_ASSIGN_OR_RETURN(auto memory,
+                            budget().Reserve(kept->weight_bytes(), kWhat));
+    return put(*kept, std::move(memory));
+  }
+  DEFORM_RETURN_IF_ERROR(Reserve(job, record.facts.scheme(), kWhat));
+  auto memory = std::move(job.memory);
+  DEFORM_ASSIGN_OR_RETURN(const auto computed, ComputeWeights(job));
+  return put(*computed, memory.Split(computed->weight_bytes()));
 }
 
 absl::StatusOr<std::shared_ptr<const Binding>> BindingRegistry::ComputeWeights(

@@ -1,6 +1,6 @@
-// Bindings: computed once for everyone who asks the same, then kept. Their
-// weights may be dropped while nobody uses them, and are computed again when
-// somebody does.
+// Bindings: computed once for everyone who asks the same, then kept, in memory
+// and in the store. Their weights may be dropped while nobody uses them; they
+// are read from the store, or computed again, when somebody does.
 #pragma once
 
 #include <atomic>
@@ -12,6 +12,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
@@ -23,10 +24,13 @@
 #include "core/weights/binding.h"
 #include "server/models/binding_record.h"
 #include "server/models/catalogue.h"
+#include "server/models/claims.h"
 #include "server/models/compressor.h"
+#include "server/models/losses.h"
 #include "server/models/memory_budget.h"
 #include "server/models/model_registry.h"
 #include "server/models/weights_cache.h"
+#include "server/models/weights_keeper.h"
 
 namespace deform::server {
 
@@ -106,17 +110,25 @@ class BindingRegistry {
     const std::shared_ptr<Job> job_;
   };
 
-  // Computes on `pool`. Models and pool are borrowed. `bind` is a parameter for
-  // tests.
+  // Computes on `pool`. Models, with their store, and pool are borrowed. `bind`
+  // is a parameter for tests.
   BindingRegistry(ModelRegistry& models, ThreadPool& pool, const Limits& limits,
                   BindFunction bind = &Bind,
-                  Compressor::Options compression = {});
+                  Compressor::Options compression = {},
+                  WeightsKeeper::Options keeping = {});
   // Cancels what is being computed and waits for it.
   ~BindingRegistry();
 
+  // Brings in what the store has, without weights; nobody else uses the
+  // registry yet. What cannot be read, or its model, is lost until it is
+  // created again: DataLoss to whoever asks for it. ResourceExhausted if there
+  // is more than the limits allow.
+  absl::StatusOr<Losses> Load(const std::vector<StoredBinding>& bindings);
+
   // Finds the binding and its weights, joins their computation, or queues one.
   // NotFound MODEL_NOT_FOUND, UNKNOWN_SCHEME; ResourceExhausted MEMORY_LIMIT,
-  // TOO_MANY_BINDS. What Bind() refuses is told by the waiter.
+  // TOO_MANY_BINDS. What Bind() or the store refuses is told by the waiter:
+  // then there is no binding.
   absl::StatusOr<std::unique_ptr<Waiter>> Create(BindSpec spec);
 
   // The binding for `user`, with its weights: waits for them if they were
@@ -131,7 +143,8 @@ class BindingRegistry {
       const std::shared_ptr<const BindingRecord>& record,
       KeepWaiting keep_waiting = WaitForever);
 
-  // NotFound; FailedPrecondition BINDING_IN_USE.
+  // NotFound; FailedPrecondition BINDING_IN_USE; what the store refuses: then
+  // it stays.
   absl::Status Remove(const std::string& tenant, const std::string& id);
 
   // Set while the weights of this binding are being computed again.
@@ -140,6 +153,7 @@ class BindingRegistry {
   // Replaces dense weights by compressed ones where that was asked for.
   Compressor& compressor() { return compressor_; }
   ModelRegistry& models() { return models_; }
+  Store& store() { return models_.store(); }
   MemoryBudget& budget() { return weights_.budget(); }
   // To look things up; Use() and Remove() are here.
   const BindingCatalogue& catalogue() const { return bindings_; }
@@ -166,6 +180,12 @@ class BindingRegistry {
   void Forget(const std::shared_ptr<Job>& job)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   absl::StatusOr<CreatedBinding> Compute(Job& job);
+  // The weights of a binding that is known: read, or else computed.
+  absl::StatusOr<CreatedBinding> Restore(Job& job);
+  absl::StatusOr<CreatedBinding> Keep(
+      std::shared_ptr<const BindingRecord> record,
+      std::shared_ptr<const Binding> binding);
+  absl::Status LoadOne(const StoredBinding& stored);
   absl::StatusOr<std::shared_ptr<const Binding>> ComputeWeights(Job& job) const;
 
   const Limits limits_;
@@ -174,6 +194,8 @@ class BindingRegistry {
   ThreadPool& pool_;
   WeightsCache weights_;
   BindingCatalogue bindings_;
+  Claims claims_;
+  WeightsKeeper keeper_;
   Compressor compressor_;
 
   Mutex mutex_;

@@ -18,6 +18,7 @@
 #include "absl/strings/string_view.h"
 #include "core/base/error.h"
 #include "core/base/mutex.h"
+#include "core/base/status_macros.h"
 #include "server/models/names.h"
 
 namespace deform::server {
@@ -42,6 +43,7 @@ class Catalogue {
   struct Entry {
     std::shared_ptr<Record> record;
     std::multiset<std::string> users;
+    bool going = false;  // It is being removed: nobody finds it.
   };
   using Key = std::pair<std::string, std::string>;  // Tenant, id.
 
@@ -79,7 +81,8 @@ class Catalogue {
       : type_(type), limit_(limit), option_(option) {}
 
   // The record that is there, or else `record`; second: whether one was there.
-  // ResourceExhausted TOO_MANY_<TYPE>S.
+  // Never while one of this id is being removed. ResourceExhausted
+  // TOO_MANY_<TYPE>S.
   absl::StatusOr<std::pair<Pointer, bool>> Insert(const std::string& tenant,
                                                   const std::string& id,
                                                   Pointer record) {
@@ -93,25 +96,34 @@ class Catalogue {
                        "s, its limit (", option_, ")"),
           {.reason = absl::StrCat("TOO_MANY_", Type(), "S"), .field = option_});
     }
+    lost_.erase(Key(tenant, id));
     entries_[Key(tenant, id)].record = record;
     return std::pair(std::move(record), false);
   }
 
-  // NotFound <TYPE>_NOT_FOUND.
+  // It was stored, and cannot be had: until another is inserted, who looks for
+  // it is told `why`.
+  void Lose(const std::string& tenant, const std::string& id,
+            absl::Status why) {
+    MutexLock lock(mutex_);
+    lost_[Key(tenant, id)] = std::move(why);
+  }
+
+  // NotFound <TYPE>_NOT_FOUND, or why it was lost.
   absl::StatusOr<Pointer> Find(const std::string& tenant,
                                const std::string& id) const {
     MutexLock lock(mutex_);
     const auto found = entries_.find(Key(tenant, id));
-    if (found == entries_.end()) return NotFound(id);
+    if (!IsThere(found)) return Missing(Key(tenant, id));
     return found->second.record;
   }
 
-  // NotFound; `user` is who an attempt to remove it will be told: "session x".
+  // As Find(); `user` is who an attempt to remove it will be told: "session x".
   absl::StatusOr<Lease> Use(const std::string& tenant, const std::string& id,
                             std::string user) {
     MutexLock lock(mutex_);
     const auto found = entries_.find(Key(tenant, id));
-    if (found == entries_.end()) return NotFound(id);
+    if (!IsThere(found)) return Missing(Key(tenant, id));
     found->second.users.insert(user);
     Lease lease;
     lease.catalogue_ = this;
@@ -121,13 +133,25 @@ class Catalogue {
     return lease;
   }
 
-  // NotFound; FailedPrecondition <TYPE>_IN_USE, which names a user.
+  // Removes it once `forget`, called without the lock held, has done so in the
+  // store; nobody finds it meanwhile. Null if it was lost. NotFound;
+  // FailedPrecondition <TYPE>_IN_USE, which names a user; what `forget`
+  // returns: then it stays.
+  using Forget = absl::FunctionRef<absl::Status()>;
   absl::StatusOr<Pointer> Remove(const std::string& tenant,
-                                 const std::string& id) {
+                                 const std::string& id,
+                                 Forget forget = NothingToForget) {
+    const Key key(tenant, id);
+    DEFORM_RETURN_IF_ERROR(BeginRemoval(key));
+    const absl::Status forgotten = forget();
     MutexLock lock(mutex_);
-    const auto found = entries_.find(Key(tenant, id));
-    if (found == entries_.end()) return NotFound(id);
-    if (!found->second.users.empty()) return InUse(id, found->second.users);
+    const auto found = entries_.find(key);
+    if (!forgotten.ok()) {
+      if (found != entries_.end()) found->second.going = false;
+      return forgotten;
+    }
+    lost_.erase(key);
+    if (found == entries_.end()) return Pointer();
     Pointer record = std::move(found->second.record);
     entries_.erase(found);
     return record;
@@ -141,7 +165,7 @@ class Catalogue {
     MutexLock lock(mutex_);
     for (auto it = entries_.upper_bound(Key(tenant, page.after));
          it != entries_.end() && it->first.first == tenant; ++it) {
-      if (!wanted(*it->second.record)) continue;
+      if (!IsThere(it) || !wanted(*it->second.record)) continue;
       if (static_cast<int>(result.records.size()) == page.size) {
         result.next = last;
         break;
@@ -167,6 +191,34 @@ class Catalogue {
   }
 
  private:
+  using Entries = std::map<Key, Entry>;
+
+  static absl::Status NothingToForget() { return absl::OkStatus(); }
+
+  bool IsThere(typename Entries::const_iterator found) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    return found != entries_.end() && !found->second.going;
+  }
+
+  absl::Status BeginRemoval(const Key& key) {
+    MutexLock lock(mutex_);
+    const auto found = entries_.find(key);
+    if (!IsThere(found)) {
+      return lost_.contains(key) ? absl::OkStatus() : NotFound(key.second);
+    }
+    if (!found->second.users.empty()) {
+      return InUse(key.second, found->second.users);
+    }
+    found->second.going = true;
+    return absl::OkStatus();
+  }
+
+  absl::Status Missing(const Key& key) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    const auto lost = lost_.find(key);
+    return lost == lost_.end() ? NotFound(key.second) : lost->second;
+  }
+
   std::string Type() const { return absl::AsciiStrToUpper(type_); }
 
   absl::Status NotFound(const std::string& id) const {
@@ -200,7 +252,8 @@ class Catalogue {
   const int64_t limit_;
   const std::string option_;
   mutable Mutex mutex_;
-  std::map<Key, Entry> entries_ ABSL_GUARDED_BY(mutex_);
+  Entries entries_ ABSL_GUARDED_BY(mutex_);
+  std::map<Key, absl::Status> lost_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace deform::server

@@ -38,8 +38,10 @@ std::string TooSmall(int64_t dense_bytes) {
 
 }  // namespace
 
-Compressor::Compressor(MemoryBudget& budget, Options options)
-    : budget_(budget), options_(std::move(options)) {}
+Compressor::Compressor(MemoryBudget& budget, Options options, Settled settled)
+    : budget_(budget),
+      options_(std::move(options)),
+      settled_(std::move(settled)) {}
 
 Compressor::~Compressor() {
   Stop();
@@ -48,14 +50,16 @@ Compressor::~Compressor() {
 }
 
 void Compressor::Add(const std::shared_ptr<const BindingRecord>& record) {
-  if (record->weight_tolerance == 0 || !options_.executor) return;
-  if (record->weights->state().compressed) return;
+  if (record->weight_tolerance == 0 || !options_.executor ||
+      record->weights->state().compressed) {
+    return Settle(record);
+  }
   const BindingFacts& facts = record->facts;
   const int64_t dense_bytes =
       WeightTiles::BytesFor(facts.point_count(), facts.column_count());
   if (!options_.is_worth(dense_bytes)) {
     record->weights->StayDense(TooSmall(dense_bytes));
-    return;
+    return Settle(record);
   }
   MutexLock lock(mutex_);
   if (stopped_ || Find(*record) != nullptr) return;
@@ -137,12 +141,14 @@ void Compressor::Run(Task& task) {
   if (!record || task.cancellation.cancelled()) return;
   const absl::Status replaced = Replace(*record, task);
   ReturnFreedMemory();
-  if (!replaced.ok()) {
+  if (replaced.ok()) {
+    MutexLock lock(listener_mutex_);
+    if (listener_) listener_(*record);
+  } else {
     record->weights->StayDense(replaced.message());
-    return;
   }
-  MutexLock lock(listener_mutex_);
-  if (listener_) listener_(*record);
+  const auto kept = task.record.lock();
+  if (kept != nullptr && !task.cancellation.cancelled()) Settle(kept);
 }
 
 absl::Status Compressor::Replace(const BindingRecord& record, Task& task) try {

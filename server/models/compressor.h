@@ -51,15 +51,18 @@ class Compressor {
     };
     std::function<bool(int64_t dense_bytes)> is_worth = &WorthCompressing;
   };
+  // Told of a binding whose weights stay in the form that they have now.
+  using Settled =
+      std::function<void(const std::shared_ptr<const BindingRecord>&)>;
   // Told of a binding whose weights are in another form now.
   using Listener = std::function<void(const BindingRecord&)>;
 
-  Compressor(MemoryBudget& budget, Options options);
+  Compressor(MemoryBudget& budget, Options options, Settled settled = {});
   // Waits until nothing runs.
   ~Compressor();
 
-  // Dense weights of `record` have been computed. Nothing happens if it does
-  // not ask for others.
+  // The weights of `record` are here, as they were computed or kept. Nothing
+  // but being settled happens if it does not ask for others.
   void Add(const std::shared_ptr<const BindingRecord>& record);
   // It is to be forgotten: its weights are let go soon.
   void Cancel(const BindingRecord& record);
@@ -93,11 +96,15 @@ class Compressor {
   void Start() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Work();
   void Run(Task& task);
+  void Settle(const std::shared_ptr<const BindingRecord>& record) const {
+    if (settled_) settled_(record);
+  }
   // OK if compressed weights have taken the place, else why dense ones stay.
   absl::Status Replace(const BindingRecord& record, Task& task);
 
   MemoryBudget& budget_;
   const Options options_;
+  const Settled settled_;
 
   mutable Mutex mutex_;
   CondVar changed_;

@@ -96,6 +96,16 @@ void WeightsCache::Slot::Touch() {
   cache_.slots_.splice(cache_.slots_.end(), cache_.slots_, place_);
 }
 
+void WeightsCache::Slot::SetKept(std::optional<WeightsForm> form) {
+  MutexLock lock(cache_.mutex_);
+  kept_ = std::move(form);
+}
+
+std::optional<WeightsForm> WeightsCache::Slot::kept() const {
+  MutexLock lock(cache_.mutex_);
+  return kept_;
+}
+
 void WeightsCache::Slot::StayDense(absl::string_view why) {
   MutexLock lock(cache_.mutex_);
   why_dense_ = std::string(why);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <list>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "core/base/mutex.h"
 #include "core/weights/binding.h"
 #include "server/models/memory_budget.h"
+#include "server/stores/records.h"
 
 namespace deform::server {
 
@@ -42,6 +44,10 @@ class WeightsCache {
     // does. Who uses the former weights keeps them.
     std::shared_ptr<const Binding> Put(std::shared_ptr<const Binding> binding,
                                        MemoryBudget::Reservation memory);
+
+    // The form in which a store keeps them, as far as is known.
+    void SetKept(std::optional<WeightsForm> form);
+    std::optional<WeightsForm> kept() const;
 
     // Why the weights are not compressed, for those who asked for that.
     void StayDense(absl::string_view why);
@@ -74,6 +80,7 @@ class WeightsCache {
     bool compressed_ = false;
     double bound_ = 0;
     std::string why_dense_;
+    std::optional<WeightsForm> kept_;
     absl::Time last_use_ = absl::InfinitePast();
   };
 

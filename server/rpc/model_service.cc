@@ -101,7 +101,7 @@ grpc::Status ModelService::DeleteModel(grpc::ServerContext* context,
   return calls_.Run("DeleteModel", *context, [&]() -> absl::Status {
     DEFORM_ASSIGN_OR_RETURN(const std::string tenant,
                             TenantOr(request->tenant()));
-    return models_.catalogue().Remove(tenant, request->model_id()).status();
+    return models_.Remove(tenant, request->model_id());
   });
 }
 

@@ -129,7 +129,7 @@ absl::StatusOr<Table> ReadTable(const File& file, int64_t size) {
     return MakeError(absl::StatusCode::kFailedPrecondition,
                      absl::StrCat(file.path(), " has format ", version,
                                   "; this version of deformd knows ", kVersion),
-                     {.reason = "FORMAT_TOO_NEW", .field = "data-directory"});
+                     {.reason = "FORMAT_TOO_NEW", .field = "data-dir"});
   }
   const int64_t body = size - kTrailerBytes - static_cast<int64_t>(table_size);
   std::vector<std::byte> table(table_size);

@@ -36,7 +36,7 @@ absl::StatusOr<DirectoryLock> DirectoryLock::Take(
     return MakeError(absl::StatusCode::kFailedPrecondition,
                      absl::StrCat("the data directory ", directory,
                                   " is used by process ", ReadPid(file)),
-                     {.reason = "DIRECTORY_IN_USE", .field = "data-directory"});
+                     {.reason = "DIRECTORY_IN_USE", .field = "data-dir"});
   }
   DEFORM_RETURN_IF_ERROR(file.Truncate(0));
   DEFORM_RETURN_IF_ERROR(file.WriteAt(0, AsBytes(absl::StrCat(getpid()))));

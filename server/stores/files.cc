@@ -48,7 +48,7 @@ absl::Status FileError(int error, absl::string_view action,
   return MakeError(code,
                    absl::StrCat("cannot ", action, " ", path, ": ",
                                 std::generic_category().message(error)),
-                   {.reason = reason, .field = "data-directory"});
+                   {.reason = reason, .field = "data-dir"});
 }
 
 absl::Status FileDamaged(const std::string& path, absl::string_view how) {

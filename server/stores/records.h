@@ -13,6 +13,7 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
+#include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include "core/deform/pose.h"
 
@@ -26,6 +27,11 @@ struct StoreKey {
   std::string id;
   auto operator<=>(const StoreKey&) const = default;
 };
+
+// Times are kept to the microsecond: what is created now.
+inline absl::Time TimeToStore() {
+  return absl::FromUnixMicros(absl::ToUnixMicros(absl::Now()));
+}
 
 // Large arrays by name, each aligned to 64 bytes. Immutable; a copy shares the
 // bytes, which live while any copy does.

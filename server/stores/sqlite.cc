@@ -41,7 +41,7 @@ absl::Status SqliteError(sqlite3* database, int result) {
   return MakeError(code,
                    absl::StrCat("the catalogue: ", sqlite3_errmsg(database),
                                 " (SQLite ", result, ", errno ", system, ")"),
-                   {.reason = reason, .field = "data-directory"});
+                   {.reason = reason, .field = "data-dir"});
 }
 
 constexpr char kSettings[] =

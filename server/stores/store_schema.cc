@@ -53,7 +53,7 @@ constexpr const char* kUpgrades[] = {kVersion1};
 
 absl::Status Refused(absl::string_view reason, absl::string_view message) {
   return MakeError(absl::StatusCode::kFailedPrecondition, message,
-                   {.reason = std::string(reason), .field = "data-directory"});
+                   {.reason = std::string(reason), .field = "data-dir"});
 }
 
 absl::Status CheckStructure(Database& database) {
@@ -64,7 +64,7 @@ absl::Status CheckStructure(Database& database) {
   return MakeError(absl::StatusCode::kDataLoss,
                    absl::StrCat("the catalogue is damaged (", verdict,
                                 "); restore it from a backup"),
-                   {.reason = "CATALOGUE_DAMAGED", .field = "data-directory"});
+                   {.reason = "CATALOGUE_DAMAGED", .field = "data-dir"});
 }
 
 }  // namespace

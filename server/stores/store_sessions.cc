@@ -168,7 +168,8 @@ absl::Status StoreDatabase::Append(int64_t session, uint64_t after,
                       .rows = std::numeric_limits<int32_t>::max()};
   refused = CheckFollows(append, after, head);
   if (!refused.ok()) return absl::OkStatus();
-  if (!append.binding_id.empty()) {
+  if (!append.binding_id.empty() &&
+      append.binding_id != row->session.binding_id) {
     const StoreKey binding = {append.session.tenant, append.binding_id};
     DEFORM_ASSIGN_OR_RETURN(const bool bound, HasBinding(binding));
     if (!bound) {

@@ -11,6 +11,7 @@
 #include "tests/bench/benches.h"
 #include "tests/bench/contest.h"
 #include "tests/bench/scenes.h"
+#include "tests/server/stores/memory_store.h"
 
 namespace deform::bench {
 namespace {
@@ -137,8 +138,9 @@ class Bound {
   std::string id;
 
  private:
+  const std::unique_ptr<Store> store_ = MemoryStore();
   ModelRegistry models_{
-      {.model_bytes = 1 << 28, .memory = 1 << 28, .count = 10}};
+      {.model_bytes = 1 << 28, .memory = 1 << 28, .count = 10}, *store_};
   ThreadPool binds_{{}};
   BindingRegistry bindings_{models_,
                             binds_,

@@ -122,7 +122,7 @@ TEST(Deformd, SaysWhereItListensAndServesThere) {
 
 TEST(Deformd, ListensOnAUnixSocket) {
   const std::string path = "unix:" + Temporary().Path("socket");
-  Process daemon({"--listen", path, "--log-level", "off"});
+  Process daemon({"--listen", path, "--in-memory", "--log-level", "off"});
   EXPECT_EQ(daemon.ReadLine(), "listening on " + path + "\n");
   EXPECT_TRUE(Client::Connect(path)->ListModels().ok());
 }
@@ -218,7 +218,7 @@ TEST(Deformd, DescribesItsServices) {
 
 TEST(Deformd, DoesNotShareAPort) {
   Daemon first;
-  Process second({"--listen", first.address()});
+  Process second({"--listen", first.address(), "--in-memory"});
   const std::string errors = second.ReadErrors();
   EXPECT_THAT(errors, HasSubstr("cannot listen on " + first.address()));
   EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << errors;
@@ -242,7 +242,7 @@ TEST(Deformd, RefusesABadConfigurationByFileAndLine) {
 
 TEST(Deformd, HelpsAndTellsItsVersion) {
   Process help({"--help"});
-  EXPECT_THAT(help.ReadAll(), HasSubstr("State is kept in memory"));
+  EXPECT_THAT(help.ReadAll(), HasSubstr("Keep nothing on disk"));
   EXPECT_EQ(help.Wait(), 0);
   Process version({"--version"});
   EXPECT_THAT(version.ReadAll(), StartsWith("deformd "));

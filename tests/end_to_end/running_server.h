@@ -14,10 +14,11 @@
 
 namespace deform {
 
-// Options for tests: a free port.
+// Options for tests: a free port, and nothing kept.
 inline server::Options TestOptions() {
   server::Options options;
   options.listen = "127.0.0.1:0";
+  options.in_memory = true;
   return options;
 }
 

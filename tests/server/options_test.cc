@@ -25,6 +25,8 @@ std::string FileWith(const std::string& text) {
 TEST(Options, HaveDefaultsThatWork) {
   const CommandLine line = Read({}).value();
   EXPECT_EQ(line.options.listen, "127.0.0.1:7777");
+  EXPECT_EQ(line.options.data_dir, "deformd-data");
+  EXPECT_FALSE(line.options.in_memory);
   EXPECT_FALSE(line.exit);
   EXPECT_TRUE(CheckOptions(line.options).ok());
 }
@@ -139,8 +141,8 @@ INSTANTIATE_TEST_SUITE_P(
          "listen: is HOST:PORT or unix:PATH, not \"localhost\""},
         {"BadPort", "listen = \"localhost:70000\"\n",
          "not \"localhost:70000\""},
-        {"OnDisk", "in-memory = false\n",
-         "in-memory: must be true: state is kept in memory"},
+        {"InMemory", "in-memory = \"no\"\n", "in-memory: is true or false"},
+        {"NoDirectory", "data-dir = \"\"\n", "data-dir: is empty"},
     }),
     [](const auto& test) { return test.param.name; });
 

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "core/base/error.h"
+#include "tests/server/stores/memory_store.h"
 #include "tests/support/shapes.h"
 
 namespace deform::server {
@@ -98,8 +99,9 @@ class BindingRegistryTest : public testing::Test {
       .memory = 1 << 20, .count = 10, .concurrent = 1, .waiting_calls = 3};
 
   ThreadPool pool_{{.threads = 3}};
+  const std::unique_ptr<Store> store_ = MemoryStore();
   ModelRegistry models_{
-      {.model_bytes = 1 << 20, .memory = 1 << 20, .count = 10}};
+      {.model_bytes = 1 << 20, .memory = 1 << 20, .count = 10}, *store_};
   const std::string model_id_ =
       models_.Register("t", "", MeshOf(Icosphere(1, 1))).value().record->id;
   GatedBind bind_;
@@ -203,13 +205,10 @@ TEST_F(BindingRegistryTest, RefusesMoreWaitingCallsThanItMayHave) {
 
 TEST_F(BindingRegistryTest, KeepsTheModelWhileItsBindingIsComputedAndKept) {
   const auto waiter = bindings_->Create(Spec()).value();
-  EXPECT_EQ(
-      DetailOf(models_.catalogue().Remove("t", model_id_).status()).reason,
-      "MODEL_IN_USE");
+  EXPECT_EQ(DetailOf(models_.Remove("t", model_id_)).reason, "MODEL_IN_USE");
   bind_.Permit(1);
   const auto created = *waiter->Wait(kLong).value();
-  const absl::Status in_use =
-      models_.catalogue().Remove("t", model_id_).status();
+  const absl::Status in_use = models_.Remove("t", model_id_);
   EXPECT_THAT(std::string(in_use.message()),
               HasSubstr("is used by binding " + created.record->id));
 }
@@ -219,7 +218,7 @@ TEST_F(BindingRegistryTest, LetsTheModelGoWithItsBinding) {
   const std::string id =
       (*bindings_->Create(Spec()).value()->Wait(kLong).value()).record->id;
   ASSERT_TRUE(bindings_->Remove("t", id).ok());
-  EXPECT_TRUE(models_.catalogue().Remove("t", model_id_).ok());
+  EXPECT_TRUE(models_.Remove("t", model_id_).ok());
   EXPECT_EQ(bindings_->budget().used(), 0);
 }
 
@@ -229,7 +228,7 @@ TEST_F(BindingRegistryTest, AFailedComputationLeavesNothing) {
   const auto failed = bindings_->Create(Spec(0.5)).value()->Wait(kLong).value();
   EXPECT_EQ(failed.status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_EQ(bindings_->budget().used(), 0);
-  EXPECT_TRUE(models_.catalogue().Remove("t", model_id_).ok());
+  EXPECT_TRUE(models_.Remove("t", model_id_).ok());
 }
 
 TEST_F(BindingRegistryTest, RefusesWeightsBeyondTheMemoryLimit) {
@@ -366,9 +365,7 @@ TEST_F(EvictionTest, KnowsAllButTheWeightsOfAnEvictedBinding) {
   EXPECT_EQ(found->facts.normal_count(), 12);
   EXPECT_GT(error, 0);
   EXPECT_EQ(found->facts.quality().reproduction_error, error);
-  EXPECT_EQ(
-      DetailOf(models_.catalogue().Remove("t", model_id_).status()).reason,
-      "MODEL_IN_USE");
+  EXPECT_EQ(DetailOf(models_.Remove("t", model_id_)).reason, "MODEL_IN_USE");
 }
 
 TEST_F(EvictionTest, ComputesEvictedWeightsAgainToTheSameBits) {

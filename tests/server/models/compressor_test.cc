@@ -11,6 +11,7 @@
 #include "core/base/error.h"
 #include "core/weights/compress_weights.h"
 #include "server/models/binding_registry.h"
+#include "tests/server/stores/memory_store.h"
 #include "tests/support/shapes.h"
 
 namespace deform::server {
@@ -114,8 +115,9 @@ class CompressorTest : public testing::Test {
   std::vector<std::string> told_;
 
   ThreadPool pool_{{.threads = 2}};
+  const std::unique_ptr<Store> store_ = MemoryStore();
   ModelRegistry models_{
-      {.model_bytes = 1 << 27, .memory = 1 << 27, .count = 10}};
+      {.model_bytes = 1 << 27, .memory = 1 << 27, .count = 10}, *store_};
   const std::string model_id_ =
       models_.Register("t", "", MeshOf(Icosphere(1, 1))).value().record->id;
   std::optional<BindingRegistry> bindings_;
@@ -236,7 +238,7 @@ TEST_F(CompressorTest, ABindingThatIsRemovedWhileItIsCompressedIsGivenUp) {
   std::string id;
   compress_ = [&](const Binding& dense, const BindControl& control) {
     EXPECT_TRUE(bindings_->Remove("t", id).ok());
-    EXPECT_TRUE(models_.catalogue().Remove("t", model_id_).ok());
+    EXPECT_TRUE(models_.Remove("t", model_id_).ok());
     EXPECT_TRUE(control.cancellation->cancelled());
     return Compressed(dense, 0);
   };

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"
+#include "tests/server/stores/memory_store.h"
 #include "tests/support/shapes.h"
 
 namespace deform::server {
@@ -12,7 +13,8 @@ constexpr ModelRegistry::Limits kLimits = {
     .model_bytes = 1 << 20, .memory = 1 << 20, .count = 10};
 
 TEST(ModelRegistry, FindsTheSameArraysAgain) {
-  ModelRegistry models(kLimits);
+  const auto store = MemoryStore();
+  ModelRegistry models(kLimits, *store);
   const auto first =
       models.Register("t", "ball", MeshOf(Icosphere(1, 1))).value();
   const auto again =
@@ -24,7 +26,8 @@ TEST(ModelRegistry, FindsTheSameArraysAgain) {
 }
 
 TEST(ModelRegistry, GivesDifferentArraysDifferentIds) {
-  ModelRegistry models(kLimits);
+  const auto store = MemoryStore();
+  ModelRegistry models(kLimits, *store);
   const Shape shape = Icosphere(1, 1);
   const auto id = [&](const Shape& s) {
     return models.Register("t", "", MeshOf(s)).value().record->id;
@@ -36,7 +39,8 @@ TEST(ModelRegistry, GivesDifferentArraysDifferentIds) {
 }
 
 TEST(ModelRegistry, TenantsDoNotShareIds) {
-  ModelRegistry models(kLimits);
+  const auto store = MemoryStore();
+  ModelRegistry models(kLimits, *store);
   const auto a = models.Register("a", "", MeshOf(Icosphere(1, 1))).value();
   const auto b = models.Register("b", "", MeshOf(Icosphere(1, 1))).value();
   EXPECT_FALSE(b.existed);
@@ -44,7 +48,8 @@ TEST(ModelRegistry, TenantsDoNotShareIds) {
 }
 
 TEST(ModelRegistry, CountsMemoryAndGivesItBack) {
-  ModelRegistry models(kLimits);
+  const auto store = MemoryStore();
+  ModelRegistry models(kLimits, *store);
   // 2562 points and 5120 faces: 123 KB; the ninth is beyond 1 MiB.
   for (int i = 1; i <= 8; ++i) {
     ASSERT_TRUE(models.Register("t", "", MeshOf(Icosphere(i, 4))).ok());
@@ -54,7 +59,7 @@ TEST(ModelRegistry, CountsMemoryAndGivesItBack) {
   EXPECT_EQ(DetailOf(refused.status()).field, "max-models-memory");
   const auto page = models.catalogue().List(
       "t", {.size = 1}, [](const ModelRecord&) { return true; });
-  ASSERT_TRUE(models.catalogue().Remove("t", page.records[0]->id).ok());
+  ASSERT_TRUE(models.Remove("t", page.records[0]->id).ok());
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "server/models/binding_registry.h"
 #include "server/models/model_registry.h"
 #include "server/models/process_memory.h"
+#include "tests/server/stores/memory_store.h"
 #include "tests/support/shapes.h"
 
 // Sanitizers keep what was freed, and shadows of everything.
@@ -78,8 +79,7 @@ class ResidentMemoryTest : public testing::Test {
     for (const auto& id : binding_ids_) {
       ASSERT_TRUE(bindings_.Remove("t", id).ok());
     }
-    for (const auto& id : model_ids_)
-      ASSERT_TRUE(models_.catalogue().Remove("t", id).ok());
+    for (const auto& id : model_ids_) ASSERT_TRUE(models_.Remove("t", id).ok());
     binding_ids_.clear();
     model_ids_.clear();
   }
@@ -99,8 +99,9 @@ class ResidentMemoryTest : public testing::Test {
 
   std::deque<std::function<void()>> compressions_;
   ThreadPool pool_{{.threads = 2}};
+  const std::unique_ptr<Store> store_ = MemoryStore();
   ModelRegistry models_{
-      {.model_bytes = 1 << 30, .memory = 1 << 30, .count = 1000}};
+      {.model_bytes = 1 << 30, .memory = 1 << 30, .count = 1000}, *store_};
   BindingRegistry bindings_{
       models_,
       pool_,

@@ -4,6 +4,7 @@
 #include "core/weights/handle_edit.h"
 #include "server/sessions/session_manager.h"
 #include "tests/server/sessions/support.h"
+#include "tests/server/stores/memory_store.h"
 
 namespace deform::server {
 namespace {
@@ -68,8 +69,9 @@ class FormChangeTest : public testing::Test {
   ManualExecutor background_;
   ManualExecutor compute_;
   ThreadPool pool_{{.threads = 1}};
+  const std::unique_ptr<Store> store_ = MemoryStore();
   ModelRegistry models_{
-      {.model_bytes = 1 << 20, .memory = 1 << 20, .count = 10}};
+      {.model_bytes = 1 << 20, .memory = 1 << 20, .count = 10}, *store_};
   BindingRegistry bindings_{
       models_,
       pool_,

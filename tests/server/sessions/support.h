@@ -14,6 +14,7 @@
 #include "server/models/binding_registry.h"
 #include "server/models/model_registry.h"
 #include "server/sessions/session.h"
+#include "tests/server/stores/memory_store.h"
 #include "tests/support/shapes.h"
 
 namespace deform::server {
@@ -159,7 +160,8 @@ class SessionRooms {
 
   std::promise<void> held_;
   ThreadPool pool_{{.threads = 1}};
-  ModelRegistry models_{kModelLimits};
+  const std::unique_ptr<Store> store_ = MemoryStore();
+  ModelRegistry models_{kModelLimits, *store_};
   BindingRegistry bindings_{models_, pool_, kBindingLimits};
 
  public:

@@ -295,7 +295,8 @@ HWY_INLINE void SolveIn(const Potential& potential, CelestialLaneJob& job) {
   job.steps = 0;
   const LaneMask clear = LookAtHandles(job, arrays);
   Approach(potential, arrays, job);
-  LaneTriple step;
+  const auto zero = hn::Zero(kDoubles);
+  LaneTriple step = {zero, zero, zero};
   const LaneMask near = Arrive(potential, arrays, job, step);
   const LaneMask exact = Spread(arrays, step, n, job.weights, job.residual);
   uint8_t bits[8] = {};

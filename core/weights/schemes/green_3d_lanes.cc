@@ -59,7 +59,9 @@ struct Corner {
 };
 
 template <class D>
-HWY_INLINE Corner<D> LoadCorner(D d, const hn::TFromD<D>* HWY_RESTRICT from) {
+HWY_INLINE Corner<D> LoadCorner(D d, const hn::TFromD<D>* HWY_RESTRICT seen,
+                                int64_t vertex, int64_t at) {
+  const hn::TFromD<D>* from = seen + vertex * 4 * kTilePoints + at;
   return {{hn::Load(d, from), hn::Load(d, from + kTilePoints),
            hn::Load(d, from + 2 * kTilePoints)},
           hn::Load(d, from + 3 * kTilePoints)};
@@ -73,6 +75,12 @@ HWY_INLINE Space<NearDoubles> Seen(const double* vertex,
           hn::Set(d, vertex[2]) - hn::Load(d, points.at[2] + at)};
 }
 
+HWY_INLINE Corner<NearDoubles> SeeCorner(const double* vertex,
+                                         const LanePoints& points, int64_t at) {
+  const Space<NearDoubles> a = Seen(vertex, points, at);
+  return {a, hn::Sqrt(a.Dot(a))};
+}
+
 // Integral of 1 / distance along an edge of `length` whose ends are `sum` away.
 template <class D>
 HWY_INLINE hn::Vec<D> EdgeLogarithm(D d, hn::Vec<D> sum, hn::Vec<D> length) {
@@ -81,6 +89,8 @@ HWY_INLINE hn::Vec<D> EdgeLogarithm(D d, hn::Vec<D> sum, hn::Vec<D> length) {
 
 template <class D>
 struct FaceShare {
+  HWY_INLINE FaceShare() {}
+
   hn::Vec<D> phi[3];
   hn::Vec<D> psi;
   hn::Mask<D> lost;  // Not set in float, where faces are far.
@@ -167,11 +177,12 @@ void InDouble(const GreenLaneCage& cage, LanePoints& points, void* scratch,
     }
     for (int64_t f = 0; f < cage.faces; ++f) {
       const GreenLaneFace<double>& face = cage.face[f];
-      Corner<Doubles> corners[3];
+      const Corner<Doubles> corners[] = {
+          LoadCorner(d, seen, face.corner[0], at),
+          LoadCorner(d, seen, face.corner[1], at),
+          LoadCorner(d, seen, face.corner[2], at)};
       hn::Vec<Doubles> log[3];
       for (int q = 0; q < 3; ++q) {
-        corners[q] =
-            LoadCorner(d, seen + face.corner[q] * 4 * kTilePoints + at);
         log[q] = hn::Load(d, logs + face.edge[q] * kTilePoints + at);
       }
       const auto share = IntegrateFace(d, face, corners, log, cage.touch);
@@ -232,11 +243,10 @@ HWY_INLINE uint32_t AddNearFace(const GreenLaneCage& cage, int64_t f,
   const NearDoubles d;
   const HalfFloats half;
   const GreenLaneFace<double>& face = cage.face[f];
-  Corner<NearDoubles> corners[3];
-  for (int q = 0; q < 3; ++q) {
-    corners[q].a = Seen(cage.vertex + 3 * face.corner[q], points, at);
-    corners[q].r = hn::Sqrt(corners[q].a.Dot(corners[q].a));
-  }
+  const Corner<NearDoubles> corners[] = {
+      SeeCorner(cage.vertex + 3 * face.corner[0], points, at),
+      SeeCorner(cage.vertex + 3 * face.corner[1], points, at),
+      SeeCorner(cage.vertex + 3 * face.corner[2], points, at)};
   hn::Vec<NearDoubles> log[3];
   auto lost = NoLane(d);
   for (int q = 0; q < 3; ++q) {
@@ -261,10 +271,11 @@ HWY_INLINE void AddFarFace(const GreenLaneCage& cage, int64_t f,
                            float* HWY_RESTRICT weights) {
   const Floats d;
   const GreenLaneFace<float>& face = cage.far_face[f];
-  Corner<Floats> corners[3];
+  const Corner<Floats> corners[] = {LoadCorner(d, seen, face.corner[0], at),
+                                    LoadCorner(d, seen, face.corner[1], at),
+                                    LoadCorner(d, seen, face.corner[2], at)};
   hn::Vec<Floats> log[3];
   for (int q = 0; q < 3; ++q) {
-    corners[q] = LoadCorner(d, seen + face.corner[q] * 4 * kTilePoints + at);
     log[q] = hn::Load(d, logs + face.edge[q] * kTilePoints + at);
   }
   const auto share = IntegrateFace(d, face, corners, log, 0.0f);

@@ -118,7 +118,9 @@ HWY_INLINE hn::Vec<D> AngleOf(D d, hn::Vec<D> y, hn::Vec<D> x) {
   return hn::IfThenElse(x < hn::Zero(d), hn::Set(d, kPi) - angle, angle);
 }
 
-// A vector in space for each lane.
+// A vector in space for each lane. Made with its content: constructors that GCC
+// makes by itself are for no instruction set, which Arm's lanes refuse. So no
+// type with lanes in it may need them.
 template <class D>
 struct Space {
   hn::Vec<D> x, y, z;

@@ -34,8 +34,9 @@ struct End {
   Lane r;
 };
 
-HWY_INLINE End LoadEnd(const double* HWY_RESTRICT from) {
+HWY_INLINE End LoadEnd(const double* HWY_RESTRICT ends, int64_t vertex) {
   const Doubles d;
+  const double* from = ends + vertex * 4 * kTilePoints;
   return {{hn::Load(d, from), hn::Load(d, from + kTilePoints),
            hn::Load(d, from + 2 * kTilePoints)},
           hn::Load(d, from + 3 * kTilePoints)};
@@ -73,8 +74,8 @@ HWY_INLINE Lanes AddTangents(const MeanValueCage& cage,
                              const double* HWY_RESTRICT ends,
                              double* HWY_RESTRICT weights) {
   const Doubles d;
-  const End b1 = LoadEnd(ends + edge.from * 4 * kTilePoints);
-  const End b2 = LoadEnd(ends + edge.to * 4 * kTilePoints);
+  const End b1 = LoadEnd(ends, edge.from);
+  const End b2 = LoadEnd(ends, edge.to);
   const auto first = b1.r < b2.r;  // The closer keeps the digits.
   const Lane x = hn::IfThenElse(first, b1.a.x, b2.a.x);
   const Lane y = hn::IfThenElse(first, b1.a.y, b2.a.y);
@@ -117,8 +118,8 @@ HWY_INLINE Lanes LookAtEdges(const MeanValueCage& cage,
   auto lost = NoLane(d);
   for (int64_t e = 0; e < cage.edges; ++e) {
     const MeanValueEdge& edge = cage.edge[e];
-    const End a = LoadEnd(ends + edge.from * 4 * kTilePoints);
-    const End b = LoadEnd(ends + edge.to * 4 * kTilePoints);
+    const End a = LoadEnd(ends, edge.from);
+    const End b = LoadEnd(ends, edge.to);
     const auto first = a.r < b.r;  // The closer keeps the digits.
     const Lane x = hn::IfThenElse(first, a.a.x, b.a.x);
     const Lane y = hn::IfThenElse(first, a.a.y, b.a.y);
@@ -147,10 +148,11 @@ HWY_INLINE Lanes AddFace(const MeanValueCage& cage, const MeanValueFace& face,
                          const double* HWY_RESTRICT angles,
                          double* HWY_RESTRICT weights, Lanes& lost) {
   const Doubles d;
-  End ends_of[3];
+  const End ends_of[] = {LoadEnd(ends, face.corner[0]),
+                         LoadEnd(ends, face.corner[1]),
+                         LoadEnd(ends, face.corner[2])};
   Lane angle[3];
   for (int q = 0; q < 3; ++q) {
-    ends_of[q] = LoadEnd(ends + face.corner[q] * 4 * kTilePoints);
     angle[q] = hn::Load(d, angles + face.edge[q] * kTilePoints);
   }
   const Lane size = hn::Max(ends_of[0].r, hn::Max(ends_of[1].r, ends_of[2].r));

@@ -149,7 +149,7 @@ class CompressedScheme
 };
 
 TEST_P(CompressedScheme, KeepsItsBoundInEveryPoseThatTriesToBreakIt) {
-  const BindingPtr dense = Dense(InBall(scheme(), dimension(), 3000));
+  const BindingPtr dense = Dense(InBall(scheme(), dimension(), 1500));
   std::mt19937 random(8);
   std::uniform_real_distribution<double> uniform(-1, 1);
   std::uniform_int_distribution<int64_t> any(0, dense->point_count() - 1);

@@ -12,6 +12,7 @@
 #include "server/models/process_memory.h"
 #include "server/options.h"
 #include "server/server.h"
+#include "server/stores/backup.h"
 
 namespace deform::server {
 namespace {
@@ -93,6 +94,19 @@ int Main(int argc, char** argv) {
   if (line->check_only) {
     std::cout << WriteToml(line->options);
     return 0;
+  }
+  if (!line->restore.empty() && line->options.in_memory) {
+    std::cerr << "deformd: --restore makes a data directory, which a server "
+                 "with --in-memory does not use\n";
+    return kBadUsage;
+  }
+  if (!line->restore.empty()) {
+    status = RestoreBackup(PosixFileSystem(), nullptr, line->restore,
+                           line->options.data_dir);
+    if (!status.ok()) {
+      std::cerr << "deformd: " << status.message() << "\n";
+      return 1;
+    }
   }
   ReturnLargeBlocks();
   const sigset_t signals = BlockSignals();

@@ -321,6 +321,10 @@ void AddFlags(CLI::App& app, CommandLine& line, std::string& config) {
       ->type_name("FILE");
   app.add_flag("--config-check", line.check_only,
                "Print the effective configuration as TOML and exit.");
+  app.add_option("--restore", line.restore,
+                 "Make data-dir, which must not exist, from this backup, of "
+                 "which every byte is verified; then serve.")
+      ->type_name("BACKUP");
   VisitOptions(line.options, [&app](const std::string& name, auto& value,
                                     double smallest, double largest,
                                     const char* meaning) {

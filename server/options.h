@@ -61,6 +61,7 @@ struct Options {
 // What the command line asks for.
 struct CommandLine {
   Options options;
+  std::string restore;      // --restore: a backup to be restored first.
   bool check_only = false;  // --config-check: print and exit.
   // Set if there is nothing to run: --help, --version, or an error.
   bool exit = false;

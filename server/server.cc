@@ -21,6 +21,7 @@ namespace {
 constexpr int kBackgroundNiceness = 10;
 // Compressing yields to all else: nobody waits for it.
 constexpr int kCompressionNiceness = 15;
+constexpr int kWakingThreads = 4;
 
 void Warn(const absl::Status& status) {
   spdlog::warn("{}", std::string(status.message()));
@@ -69,7 +70,8 @@ SessionEnvironment EnvironmentOf(const Options& options,
           .drags = &drags,
           .clock = [] { return std::chrono::steady_clock::now(); },
           .max_participants = options.max_participants,
-          .stall_timeout = options.stall_timeout.milliseconds()};
+          .stall_timeout = options.stall_timeout.milliseconds(),
+          .report = [](const absl::Status& status) { Warn(status); }};
 }
 
 absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Options& options) {
@@ -98,6 +100,8 @@ struct Server::Parts {
         compressions({.threads = options.compute_threads,
                       .niceness = kCompressionNiceness}),
         writes({.threads = 1, .niceness = kBackgroundNiceness}),
+        wakes(std::make_unique<ThreadPool>(
+            ThreadPool::Options{.threads = kWakingThreads})),
         models(ModelLimits(options), *store),
         bindings(models, binds, BindingLimits(options), &Bind,
                  CompressionOptions(compressions), KeepingOptions(writes)),
@@ -106,7 +110,10 @@ struct Server::Parts {
         sessions(bindings,
                  {.memory = options.max_sessions_memory.value,
                   .count = options.max_sessions},
-                 EnvironmentOf(options, scheduler, drags)) {}
+                 EnvironmentOf(options, scheduler, drags),
+                 [this](std::function<void()> task) {
+                   wakes->Submit(std::move(task));
+                 }) {}
 
   // Before anyone is served.
   absl::Status Load() {
@@ -116,6 +123,8 @@ struct Server::Parts {
     Warn(losses);
     DEFORM_ASSIGN_OR_RETURN(losses, bindings.Load(contents.bindings));
     Warn(losses);
+    DEFORM_ASSIGN_OR_RETURN(losses, sessions.Load(contents.sessions));
+    Warn(losses);
     return absl::OkStatus();
   }
 
@@ -123,6 +132,8 @@ struct Server::Parts {
   // then the rest, from the top down.
   ~Parts() {
     grpc.reset();
+    sessions.StopWaiting();
+    wakes.reset();
     compute.reset();
   }
 
@@ -132,6 +143,8 @@ struct Server::Parts {
   ThreadPool background;  // Weights again, for those who ask to see them.
   ThreadPool compressions;
   ThreadPool writes;  // Weights to the store: waits for the disk.
+  // Wait for the weights of stored sessions that are wanted again.
+  std::unique_ptr<ThreadPool> wakes;
   ModelRegistry models;
   BindingRegistry bindings;
   BatchScheduler scheduler;
@@ -153,7 +166,8 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Options& options) {
                         {.models = parts->models,
                          .bindings = parts->bindings,
                          .sessions = parts->sessions,
-                         .background = parts->background}));
+                         .background = parts->background,
+                         .backup_dir = options.data_dir + "/backups"}));
   return std::unique_ptr<Server>(new Server(std::move(parts)));
 }
 
@@ -164,7 +178,12 @@ Server::~Server() = default;
 const std::string& Server::address() const { return parts_->grpc->address(); }
 
 bool Server::Drain(std::chrono::milliseconds patience) {
-  return parts_->grpc->Drain(patience);
+  const bool done = parts_->grpc->Drain(patience);
+  // What was answered is durable when this returns.
+  if (const absl::Status synced = parts_->store->Sync(); !synced.ok()) {
+    Warn(synced);
+  }
+  return done;
 }
 
 }  // namespace deform::server

@@ -18,6 +18,7 @@
   X(Picture)               \
   X(Verify)                \
   X(Status)                \
+  X(Backup)                \
   X(Load)                  \
   X(Completion)            \
   X(Version)

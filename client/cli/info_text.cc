@@ -163,6 +163,7 @@ Json ToJson(const SessionInfo& session) {
   return {{"session_id", session.session_id},
           {"binding_id", session.binding_id},
           {"revision", session.revision},
+          {"durable_revision", session.durable_revision},
           {"epoch", session.epoch},
           {"participant_count", session.participant_count},
           {"create_time", TimeText(session.create_time)}};
@@ -281,6 +282,7 @@ void Describe(const SessionInfo& session, std::ostream& out) {
   properties.Add("session", session.session_id);
   properties.Add("binding", session.binding_id);
   properties.Add("revision", absl::StrCat(session.revision));
+  properties.Add("durable revision", absl::StrCat(session.durable_revision));
   properties.Add("epoch", absl::StrCat(session.epoch));
   properties.Add("participants", absl::StrCat(session.participant_count));
   properties.Add("created", TimeText(session.create_time));

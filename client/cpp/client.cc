@@ -419,6 +419,15 @@ absl::StatusOr<ServerStatus> Client::GetServerStatus() {
   return FromProto(response.status());
 }
 
+absl::StatusOr<std::string> Client::Backup(absl::string_view name) {
+  v1::BackupRequest request;
+  request.set_name(std::string(name));
+  v1::BackupResponse response;
+  DEFORM_RETURN_IF_ERROR(impl_->Call(
+      *impl_->server, &v1::ServerService::Stub::Backup, request, &response));
+  return response.directory();
+}
+
 absl::StatusOr<DeformStream> Client::Deform(absl::string_view session_id,
                                             Delivery delivery) {
   auto stream = std::make_unique<DeformStream::Impl>(*impl_->sessions);

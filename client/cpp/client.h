@@ -143,6 +143,8 @@ class Client {
 
   // What the server holds, has done, and costs.
   absl::StatusOr<ServerStatus> GetServerStatus();
+  // Has the server copy all that it stores; returns where, on its machine.
+  absl::StatusOr<std::string> Backup(absl::string_view name);
 
   // Joins a session: poses in, frames out.
   absl::StatusOr<DeformStream> Deform(absl::string_view session_id,

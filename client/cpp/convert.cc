@@ -288,6 +288,7 @@ SessionInfo FromProto(const v1::Session& session) {
   return {.session_id = session.session_id(),
           .binding_id = session.binding_id(),
           .revision = session.revision(),
+          .durable_revision = session.durable_revision(),
           .epoch = session.epoch(),
           .participant_count = static_cast<int>(session.participant_count()),
           .create_time = FromProto(session.create_time())};

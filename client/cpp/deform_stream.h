@@ -23,6 +23,8 @@ enum class Delivery {
 struct Frame {
   uint64_t revision = 0;
   uint64_t epoch = 0;
+  // Up to which the session outlived the server's end when this was sent.
+  uint64_t durable_revision = 0;
   // The newest of our poses that this revision contains; 0 for none.
   uint64_t answers_sequence = 0;
   int dimension = 3;

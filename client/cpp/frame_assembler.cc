@@ -35,6 +35,7 @@ absl::Status FrameAssembler::Begin(const v1::FrameChunk& chunk, Frame& frame) {
   revision_ = chunk.revision();
   frame.revision = chunk.revision();
   frame.epoch = chunk.epoch();
+  frame.durable_revision = chunk.durable_revision();
   frame.answers_sequence = chunk.answers_sequence();
   frame.dimension = dimension_;
   frame.origin = origin_;

@@ -121,6 +121,8 @@ struct SessionInfo {
   std::string session_id;
   std::string binding_id;
   uint64_t revision = 0;  // 0 is the rest pose.
+  // What outlives the server of it; 0 if it keeps nothing.
+  uint64_t durable_revision = 0;
   uint64_t epoch = 0;
   int participant_count = 0;
   WallTime create_time;

@@ -138,7 +138,13 @@ class BindingRegistry {
                                    const std::string& id,
                                    const std::string& user,
                                    KeepWaiting keep_waiting = WaitForever);
-  // The same without keeping it from being removed.
+  // Keeps the binding for `user` without its weights. As Find().
+  absl::StatusOr<BindingCatalogue::Lease> Hold(const std::string& tenant,
+                                               const std::string& id,
+                                               const std::string& user) {
+    return bindings_.Use(tenant, id, user);
+  }
+  // The weights without keeping the binding from being removed.
   absl::StatusOr<std::shared_ptr<const Binding>> WeightsOf(
       const std::shared_ptr<const BindingRecord>& record,
       KeepWaiting keep_waiting = WaitForever);

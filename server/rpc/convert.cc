@@ -415,6 +415,7 @@ void ToProto(const SessionState& state, v1::Session* session) {
   session->set_session_id(state.id);
   session->set_binding_id(state.binding_id);
   session->set_revision(state.revision);
+  session->set_durable_revision(state.durable_revision);
   session->set_epoch(state.epoch);
   session->set_participant_count(state.participants);
   ToProto(state.create_time, session->mutable_create_time());
@@ -429,7 +430,7 @@ void ToProto(const CoordinateScheme& scheme, v1::Scheme* out) {
 
 void ToProto(const Session::Joined& joined, const FrameEncoding& encoding,
              v1::Joined* out) {
-  const BindingFacts& binding = *joined.binding;
+  const BindingFacts& binding = joined.binding;
   ToProto(joined.state, out->mutable_session());
   out->set_encoding(std::string(encoding.id()));
   out->set_dimension(binding.dimension());

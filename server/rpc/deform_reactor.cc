@@ -196,8 +196,9 @@ void DeformReactor::StartNextWrite() {
 }
 
 void DeformReactor::WriteChunk() {
-  outgoing_ = FrameMessage(frame_->send, frame_->next_chunk++,
-                           participant_->session().epoch());
+  const Session& session = participant_->session();
+  outgoing_ = FrameMessage(frame_->send, frame_->next_chunk++, session.epoch(),
+                           session.durable_revision());
   const bool last = frame_->next_chunk == frame_->send.frame->chunks.size();
   streams_.counters_.CountChunk(outgoing_.Length(), last);
   if (last) {

@@ -19,7 +19,7 @@ uint32_t Clamped(Integer value) {
 
 // The chunk without its data.
 v1::FrameChunk ChunkHeader(const FrameToSend& send, size_t index,
-                           uint64_t epoch) {
+                           uint64_t epoch, uint64_t durable_revision) {
   const Frame& frame = *send.frame;
   const Frame::Chunk& chunk = frame.chunks[index];
   v1::FrameChunk header;
@@ -37,6 +37,7 @@ v1::FrameChunk ChunkHeader(const FrameToSend& send, size_t index,
       header.add_origin(frame.info.origin[c]);
     }
   }
+  header.set_durable_revision(durable_revision);
   header.set_skipped_revisions(send.skipped_revisions);
   header.set_columns_applied(Clamped(frame.info.columns_applied));
   header.set_exit_mismatch(frame.info.exit_mismatch);
@@ -56,9 +57,10 @@ void AppendTag(uint32_t field, size_t length, std::string& out) {
 }  // namespace
 
 grpc::ByteBuffer FrameMessage(const FrameToSend& send, size_t chunk,
-                              uint64_t epoch) {
+                              uint64_t epoch, uint64_t durable_revision) {
   const Frame::Chunk& data = send.frame->chunks[chunk];
-  std::string inner = ChunkHeader(send, chunk, epoch).SerializeAsString();
+  std::string inner =
+      ChunkHeader(send, chunk, epoch, durable_revision).SerializeAsString();
   AppendTag(v1::FrameChunk::kDataFieldNumber, data.size, inner);
   std::string header;
   AppendTag(v1::DeformResponse::kFrameFieldNumber, inner.size() + data.size,

@@ -15,6 +15,6 @@ namespace deform::server {
 // the last field, so both together are one valid message. The buffer keeps the
 // frame alive until gRPC has sent it.
 grpc::ByteBuffer FrameMessage(const FrameToSend& send, size_t chunk,
-                              uint64_t epoch);
+                              uint64_t epoch, uint64_t durable_revision);
 
 }  // namespace deform::server

@@ -19,6 +19,7 @@ struct Rooms {
   BindingRegistry& bindings;
   SessionManager& sessions;
   ThreadPool& background;  // For long computations.
+  std::string backup_dir;  // Where backups are made, each in a folder.
 };
 
 class GrpcServer {

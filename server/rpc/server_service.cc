@@ -2,6 +2,9 @@
 
 #include <thread>
 
+#include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
+#include "server/models/names.h"
 #include "server/rpc/process_usage.h"
 
 namespace deform::server {
@@ -32,6 +35,31 @@ grpc::Status ServerService::GetServerStatus(
     status.set_frame_bytes_sent(counters.frame_bytes());
     status.set_poses_accepted(counters.poses_accepted());
     status.set_poses_rejected(counters.poses_rejected());
+    return absl::OkStatus();
+  });
+}
+
+grpc::Status ServerService::Backup(grpc::ServerContext* context,
+                                   const v1::BackupRequest* request,
+                                   v1::BackupResponse* response) {
+  return calls_.Run("Backup", *context, [&]() -> absl::Status {
+    // Nobody chooses a path on the server's machine.
+    DEFORM_RETURN_IF_ERROR(CheckName(request->name(), "name"));
+    const std::string directory =
+        absl::StrCat(rooms_.backup_dir, "/", request->name());
+    DEFORM_RETURN_IF_ERROR(rooms_.models.store().Backup(directory));
+    response->set_directory(directory);
+    return absl::OkStatus();
+  });
+}
+
+grpc::Status ServerService::CollectOrphans(
+    grpc::ServerContext* context, const v1::CollectOrphansRequest* /*request*/,
+    v1::CollectOrphansResponse* response) {
+  return calls_.Run("CollectOrphans", *context, [&]() -> absl::Status {
+    DEFORM_ASSIGN_OR_RETURN(const int64_t removed,
+                            rooms_.models.store().CollectOrphans());
+    response->set_files_removed(static_cast<uint64_t>(removed));
     return absl::OkStatus();
   });
 }

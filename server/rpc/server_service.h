@@ -23,6 +23,12 @@ class ServerService final : public v1::ServerService::Service {
   grpc::Status GetServerStatus(grpc::ServerContext* context,
                                const v1::GetServerStatusRequest* request,
                                v1::GetServerStatusResponse* response) override;
+  grpc::Status Backup(grpc::ServerContext* context,
+                      const v1::BackupRequest* request,
+                      v1::BackupResponse* response) override;
+  grpc::Status CollectOrphans(grpc::ServerContext* context,
+                              const v1::CollectOrphansRequest* request,
+                              v1::CollectOrphansResponse* response) override;
 
  private:
   CallRunner& calls_;

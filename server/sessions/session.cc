@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/time/clock.h"
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
 #include "server/models/names.h"
@@ -27,26 +26,36 @@ double LargestJump(const Deformer& from, const Deformer& to) {
 std::shared_ptr<Session> Session::Create(
     std::string id, BindingInUse binding, MemoryBudget::Reservation memory,
     const SessionEnvironment& environment) {
-  return std::shared_ptr<Session>(new Session(std::move(id), std::move(binding),
-                                              std::move(memory), environment));
+  const Rig& rig = binding.lease.record()->facts.rig();
+  return std::shared_ptr<Session>(
+      new Session({.id = std::move(id),
+                   .at = {.epoch = 1, .pose = RestPose(rig)},
+                   .create_time = TimeToStore()},
+                  std::move(binding), std::move(memory), environment));
 }
 
-Session::Session(std::string id, BindingInUse binding,
+Session::Session(StoredStart start, BindingInUse use,
                  MemoryBudget::Reservation memory,
                  const SessionEnvironment& environment)
-    : id_(std::move(id)),
-      tenant_(binding.lease.record()->tenant),
-      dimension_(binding.binding->dimension()),
-      create_time_(absl::Now()),
+    : id_(std::move(start.id)),
+      tenant_(use.lease.record()->tenant),
+      dimension_(use.lease.record()->facts.dimension()),
+      create_time_(start.create_time),
       environment_(environment),
-      deformer_(std::make_unique<Deformer>(binding.binding, nullptr,
-                                           *environment.drags)),
       memory_(std::move(memory)),
-      lease_(std::move(binding.lease)),
+      lease_(std::move(use.lease)),
       binding_id_(lease_.record()->id),
-      binding_(std::move(binding.binding)),
-      queue_(RestPose(binding_->rig())),
-      pose_(RestPose(binding_->rig())) {
+      weights_(std::move(use.binding)),
+      queue_(start.at.pose),
+      revision_(start.at.revision),
+      pose_(std::move(start.at.pose)),
+      journal_(environment.store, {tenant_, id_}, start.at.epoch,
+               start.at.revision, environment.report) {
+  if (weights_ != nullptr) {
+    deformer_ =
+        std::make_unique<Deformer>(weights_, nullptr, *environment_.drags);
+  }
+  info_.revision = revision_;
   info_.origin = BoxOf(pose_.vertices).center();
   info_.origin_number = 1;
 }
@@ -74,6 +83,7 @@ SessionState Session::StateLocked() const {
           .id = id_,
           .binding_id = binding_id_,
           .revision = revision_,
+          .durable_revision = durable_revision(),
           .epoch = epoch(),
           .participants = audience_.size(),
           .create_time = create_time_};
@@ -96,7 +106,7 @@ absl::StatusOr<Session::Joined> Session::Join(
   Schedule();
   return Joined{
       std::unique_ptr<Participant>(new Participant(shared_from_this(), seat)),
-      StateLocked(), binding_, pose_};
+      StateLocked(), facts(), pose_};
 }
 
 void Session::Move(RigMove move) {
@@ -115,9 +125,9 @@ void Session::Move(RigMove move) {
 
 void Session::Refresh() {
   MutexLock lock(mutex_);
-  if (closed_) return;
+  if (closed_ || weights_ == nullptr) return;
   auto now = lease_.record()->weights->Get();
-  if (now == nullptr || now == binding_) return;
+  if (now == nullptr || now == weights_) return;
   refreshed_ = std::move(now);
   Schedule();
 }
@@ -166,8 +176,14 @@ void Session::Schedule() {
                       refreshed_ != nullptr)) {
     return;
   }
+  if (weights_ == nullptr) {
+    if (waking_) return;
+    waking_ = true;
+    environment_.wake(shared_from_this());
+    return;
+  }
   scheduled_ = true;
-  environment_.scheduler->Add(shared_from_this(), *binding_);
+  environment_.scheduler->Add(shared_from_this(), *weights_);
 }
 
 Session::Step Session::BeginStep() {
@@ -199,6 +215,7 @@ void Session::FinishStep(Step step, ThreadPool* pool) {
     frames[encoding] = EncodeFrame(*deformer_, *encoding, info_, pool);
   }
   Wake(Publish(step, std::move(frames)));
+  EndIfLost();
   if (!step.move) return;
   // The binding before is let go before anyone learns of it.
   const auto done = std::move(step.move->done);
@@ -269,19 +286,22 @@ void Session::ChangeForm(Step& step, ThreadPool* pool) {
   deformer_ = std::move(next);
   // The former weights go with the step, not under the lock.
   MutexLock lock(mutex_);
-  binding_.swap(step.refreshed);
+  weights_.swap(step.refreshed);
 }
 
 Session::Receivers Session::Publish(Step& step, Audience::Frames frames) {
   MutexLock lock(mutex_);
+  Pose before;
   if (step.change != nullptr) PublishChange(step);
   if (step.pose) {
-    pose_ = step.pose->pose;
+    before = std::exchange(pose_, std::move(step.pose->pose));
     for (const PoseQueue::Answer& answer : step.pose->answers) {
       audience_.Contain(answer.participant, answer.sequence);
     }
   }
+  const bool newer = revision_ != info_.revision;
   revision_ = info_.revision;
+  if (newer) Journal(step, before);
   audience_.Publish(revision_, std::move(frames));
   scheduled_ = false;
   Schedule();
@@ -295,7 +315,7 @@ void Session::PublishChange(Step& step) {
   if (!closed_) lease_ = std::move(step.move->to.lease);
   memory_ = std::move(step.move->memory);
   binding_id_ = step.change->binding_id;
-  binding_ = std::move(step.move->to.binding);
+  weights_ = std::move(step.move->to.binding);
   rig_history_.Add(step.change);
   audience_.Announce(step.change);
 }
@@ -320,7 +340,7 @@ absl::StatusOr<PoseUpdate> Session::CheckPose(
   if (rig_changes < changes) {
     return rig_history_.TakeOver(*update, changes - rig_changes);
   }
-  DEFORM_RETURN_IF_ERROR(CheckPoseUpdate(*update, binding_->rig()));
+  DEFORM_RETURN_IF_ERROR(CheckPoseUpdate(*update, facts().rig()));
   return *update;
 }
 

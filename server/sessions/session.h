@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
@@ -28,11 +29,14 @@
 #include "server/sessions/pose_queue.h"
 #include "server/sessions/rig_change.h"
 #include "server/sessions/rig_history.h"
+#include "server/sessions/session_journal.h"
 
 namespace deform::server {
 
 // Never goes back; tests pass their own.
 using Clock = std::function<std::chrono::steady_clock::time_point()>;
+
+class Session;
 
 // What all sessions of a server share. Pointers are borrowed.
 struct SessionEnvironment {
@@ -42,6 +46,11 @@ struct SessionEnvironment {
   int max_participants = 64;
   // How long a receiver may take to send one message.
   std::chrono::milliseconds stall_timeout{10000};
+  JournalReport report = {};  // May be empty.
+  // What the manager adds. The store of all sessions; null: they are not kept.
+  Store* store = nullptr;
+  // Has WakeUp() called soon, never inside the call.
+  std::function<void(std::shared_ptr<Session>)> wake = {};
 };
 
 // A session as others see it.
@@ -50,28 +59,46 @@ struct SessionState {
   std::string id;
   std::string binding_id;
   uint64_t revision = 0;
+  // What of it is there after a restart; 0 if the server keeps nothing.
+  uint64_t durable_revision = 0;
   uint64_t epoch = 0;
   int participants = 0;
   absl::Time create_time;
 };
 
+// As the store has it.
+struct StoredStart {
+  std::string id;
+  SessionPose at;  // In the epoch of this server.
+  absl::Time create_time;
+};
+
 // Poses merge into a queue of steps; a step is run by the scheduler, one at a
 // time: the deformer moves, the revision rises, the frame is encoded once per
-// encoding in use and offered to every participant. Thread-safe; the lock is
-// never held while deforming or encoding.
+// encoding in use and offered to every participant. The store is told of every
+// revision, and nobody waits for it. Thread-safe; the lock is never held while
+// deforming or encoding.
 class Session : public std::enable_shared_from_this<Session> {
  public:
   // A participant's poses that may wait with Delivery::kEvery.
   static constexpr int64_t kMaxOwnSteps = 4;
 
-  // Starts at the rest pose, revision 0.
+  // Starts at the rest pose, revision 0, epoch 1. It is to be put into the
+  // store before it is used.
   static std::shared_ptr<Session> Create(std::string id, BindingInUse binding,
                                          MemoryBudget::Reservation memory,
                                          const SessionEnvironment& environment);
+  // Starts where it was, asleep: without weights, until somebody wants a frame
+  // or sends a pose. DataLoss SESSION_DAMAGED if the pose is not of this rig.
+  static absl::StatusOr<std::shared_ptr<Session>> Restore(
+      StoredStart start, BindingCatalogue::Lease binding,
+      MemoryBudget::Reservation memory, const SessionEnvironment& environment);
 
   const std::string& id() const { return id_; }
   // Raised by every server that takes the session over.
-  uint64_t epoch() const { return 1; }
+  uint64_t epoch() const { return journal_.epoch(); }
+  // See SessionJournal. Takes no lock.
+  uint64_t durable_revision() const { return journal_.durable_revision(); }
   int dimension() const { return dimension_; }
   SessionState state() const;
 
@@ -85,7 +112,7 @@ class Session : public std::enable_shared_from_this<Session> {
   struct Joined {
     std::unique_ptr<Participant> participant;
     SessionState state;
-    std::shared_ptr<const Binding> binding;
+    BindingFacts binding;
     Pose pose;
   };
   // A frame of the present state follows. ResourceExhausted
@@ -102,6 +129,14 @@ class Session : public std::enable_shared_from_this<Session> {
   // before the next pose. That is no revision: who joins may see the present
   // one apart from others by the bound of compressed weights.
   void Refresh();
+
+  // What a session asleep still needs, and who can get it: then it goes on. If
+  // the weights cannot be had, the streams there are end with the reason, and
+  // it sleeps on.
+  using FindWeights =
+      absl::FunctionRef<absl::StatusOr<std::shared_ptr<const Binding>>(
+          const std::shared_ptr<const BindingRecord>&)>;
+  void WakeUp(FindWeights find_weights);
 
   // Ends every stream with `status` and lets the binding go.
   void End(const absl::Status& status);
@@ -142,10 +177,14 @@ class Session : public std::enable_shared_from_this<Session> {
     uint64_t last_sequence = 0;  // Of the poses accepted.
   };
 
-  Session(std::string id, BindingInUse binding,
-          MemoryBudget::Reservation memory,
+  // `binding` may be null in `use`.
+  Session(StoredStart start, BindingInUse use, MemoryBudget::Reservation memory,
           const SessionEnvironment& environment);
 
+  // Of the present binding, also while the session sleeps; until it has ended.
+  const BindingFacts& facts() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    return lease_.record()->facts;
+  }
   SessionState StateLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // The update as it is for the present rig.
   absl::StatusOr<PoseUpdate> CheckPose(const Sender& sender, uint64_t sequence,
@@ -163,6 +202,11 @@ class Session : public std::enable_shared_from_this<Session> {
                 std::chrono::microseconds time);
   Receivers Publish(Step& step, Audience::Frames frames);
   void PublishChange(Step& step) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Tells the store of the revision that `before` went to.
+  void Journal(const Step& step, const Pose& before)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // If it has become another server's.
+  void EndIfLost();
 
   const std::string id_;
   const std::string tenant_;
@@ -170,8 +214,8 @@ class Session : public std::enable_shared_from_this<Session> {
   const absl::Time create_time_;
   const SessionEnvironment environment_;
 
-  // Used by the running step only; the queue of the scheduler hands them from
-  // one to the next.
+  // Used by the running step only, or by who wakes the session up; the queue of
+  // the scheduler hands them from one to the next.
   std::unique_ptr<Deformer> deformer_;
   FrameInfo info_;
 
@@ -179,7 +223,9 @@ class Session : public std::enable_shared_from_this<Session> {
   MemoryBudget::Reservation memory_ ABSL_GUARDED_BY(mutex_);
   BindingCatalogue::Lease lease_ ABSL_GUARDED_BY(mutex_);
   std::string binding_id_ ABSL_GUARDED_BY(mutex_);
-  std::shared_ptr<const Binding> binding_ ABSL_GUARDED_BY(mutex_);
+  // Null while it is asleep.
+  std::shared_ptr<const Binding> weights_ ABSL_GUARDED_BY(mutex_);
+  bool waking_ ABSL_GUARDED_BY(mutex_) = false;
   // The same weights in another form, to be changed over to.
   std::shared_ptr<const Binding> refreshed_ ABSL_GUARDED_BY(mutex_);
   std::deque<RigMove> moves_ ABSL_GUARDED_BY(mutex_);
@@ -191,6 +237,13 @@ class Session : public std::enable_shared_from_this<Session> {
   std::optional<absl::Status> closed_ ABSL_GUARDED_BY(mutex_);
   Audience audience_ ABSL_GUARDED_BY(mutex_);
   std::map<int64_t, Sender> senders_ ABSL_GUARDED_BY(mutex_);  // By seat.
+  // Appends are made with the lock held; none waits for a disk.
+  SessionJournal journal_;
+  // Set if the session has become another server's.
+  std::optional<absl::Status> lost_ ABSL_GUARDED_BY(mutex_);
 };
+
+// NotFound SESSION_DELETED.
+absl::Status SessionDeleted(const std::string& id);
 
 }  // namespace deform::server

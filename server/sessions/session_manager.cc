@@ -30,13 +30,24 @@ absl::Status Draining() {
 }
 
 SessionManager::SessionManager(BindingRegistry& bindings, const Limits& limits,
-                               SessionEnvironment environment)
+                               SessionEnvironment environment, Executor patient)
     : environment_(std::move(environment)),
       bindings_(bindings),
       budget_(limits.memory, "max-sessions-memory"),
       sessions_("session", limits.count, "max-sessions") {
   bindings_.compressor().SetListener(
       [this](const BindingRecord& record) { Refresh(record); });
+  environment_.store = &store();
+  environment_.wake =
+      [this, patient = std::move(patient)](std::shared_ptr<Session> session) {
+        patient([this, session = std::move(session)] {
+          session->WakeUp([this](const auto& record) {
+            return bindings_.WeightsOf(record, [this] { return !stopping_; });
+          });
+          // If the form has changed before the session could be told.
+          session->Refresh();
+        });
+      };
 }
 
 SessionManager::~SessionManager() {
@@ -52,6 +63,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionManager::Create(
     DEFORM_ASSIGN_OR_RETURN(id, RandomId());
   }
   DEFORM_RETURN_IF_ERROR(CheckName(id, "session_id"));
+  const Claims::Claim claim = claims_.Take(tenant, id);
   auto session = sessions_.Find(tenant, id);
   if (!session.ok()) {
     DEFORM_ASSIGN_OR_RETURN(const auto record,
@@ -63,14 +75,18 @@ absl::StatusOr<std::shared_ptr<Session>> SessionManager::Create(
         auto binding,
         bindings_.Use(tenant, binding_id, absl::StrCat("session ", id),
                       keep_waiting));
-    auto made = Session::Create(id, std::move(binding), std::move(memory),
-                                environment_);
-    // Under the lock of Drain(): it then sees every session that was made.
-    MutexLock lock(mutex_);
-    if (draining_) return Draining();
-    DEFORM_ASSIGN_OR_RETURN(auto inserted,
-                            sessions_.Insert(tenant, id, std::move(made)));
-    session = std::move(inserted.first);
+    session = Session::Create(id, std::move(binding), std::move(memory),
+                              environment_);
+    DEFORM_RETURN_IF_ERROR(
+        Put({.key = {tenant, id},
+             .binding_id = binding_id,
+             .epoch = (*session)->epoch(),
+             .create_time = (*session)->state().create_time}));
+    const absl::Status inserted = Insert(tenant, id, *session);
+    if (!inserted.ok()) {
+      store().DeleteSession({tenant, id}).IgnoreError();
+      return inserted;
+    }
     // If the form has changed before the session could be told.
     (*session)->Refresh();
   }
@@ -84,6 +100,55 @@ absl::StatusOr<std::shared_ptr<Session>> SessionManager::Create(
          .resource_name = id});
   }
   return session;
+}
+
+absl::Status SessionManager::Put(const StoredSession& session) {
+  const absl::Status status = store().PutSession(session);
+  if (DetailOf(status).reason != "SESSION_EXISTS") return status;
+  DEFORM_RETURN_IF_ERROR(store().DeleteSession(session.key));
+  return store().PutSession(session);
+}
+
+absl::Status SessionManager::Insert(const std::string& tenant,
+                                    const std::string& id,
+                                    std::shared_ptr<Session> session) {
+  // Under the lock of Drain(): it then sees every session that was made.
+  MutexLock lock(mutex_);
+  if (draining_) return Draining();
+  return sessions_.Insert(tenant, id, std::move(session)).status();
+}
+
+absl::StatusOr<Losses> SessionManager::Load(
+    const std::vector<StoredSession>& sessions) {
+  Losses losses;
+  for (const StoredSession& session : sessions) {
+    const auto& [tenant, id] = session.key;
+    const absl::Status status = LoadOne(session);
+    if (absl::IsDataLoss(status) || absl::IsNotFound(status)) {
+      losses.push_back(Damaged("session", id, status, "create it again"));
+      sessions_.Lose(tenant, id, losses.back());
+    } else if (!status.ok()) {
+      return Annotate(status, absl::StrCat("session ", id, ": "));
+    }
+  }
+  return losses;
+}
+
+absl::Status SessionManager::LoadOne(const StoredSession& stored) {
+  const auto& [tenant, id] = stored.key;
+  StoredStart start{.id = id, .create_time = stored.create_time};
+  DEFORM_ASSIGN_OR_RETURN(start.at, store().LoadSession(stored.key));
+  DEFORM_ASSIGN_OR_RETURN(auto binding,
+                          bindings_.Hold(tenant, start.at.binding_id,
+                                         absl::StrCat("session ", id)));
+  DEFORM_ASSIGN_OR_RETURN(
+      auto memory, budget_.Reserve(Session::BytesFor(binding.record()->facts),
+                                   "the stored session needs"));
+  DEFORM_ASSIGN_OR_RETURN(start.at.epoch, store().TakeOver(stored.key));
+  DEFORM_ASSIGN_OR_RETURN(auto session,
+                          Session::Restore(std::move(start), std::move(binding),
+                                           std::move(memory), environment_));
+  return sessions_.Insert(tenant, id, std::move(session)).status();
 }
 
 absl::Status SessionManager::CheckHave(const std::string& tenant,
@@ -147,12 +212,12 @@ void SessionManager::Refresh(const BindingRecord& record) {
 
 absl::Status SessionManager::Delete(const std::string& tenant,
                                     const std::string& id) {
-  DEFORM_ASSIGN_OR_RETURN(const auto session, sessions_.Remove(tenant, id));
-  session->End(MakeError(absl::StatusCode::kNotFound,
-                         absl::StrCat("session ", Quoted(id), " was deleted"),
-                         {.reason = "SESSION_DELETED",
-                          .resource_type = "session",
-                          .resource_name = id}));
+  const Claims::Claim claim = claims_.Take(tenant, id);
+  DEFORM_ASSIGN_OR_RETURN(const auto session, sessions_.Remove(tenant, id, [&] {
+    return store().DeleteSession({tenant, id});
+  }));
+  if (session == nullptr) return absl::OkStatus();  // It was lost.
+  session->End(SessionDeleted(id));
   return absl::OkStatus();
 }
 

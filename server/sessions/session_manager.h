@@ -1,6 +1,7 @@
 // The sessions of the server.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <string>
 #include <utility>
@@ -10,6 +11,8 @@
 #include "absl/status/statusor.h"
 #include "server/models/binding_registry.h"
 #include "server/models/catalogue.h"
+#include "server/models/claims.h"
+#include "server/models/losses.h"
 #include "server/sessions/rig_moves.h"
 #include "server/sessions/session.h"
 
@@ -25,17 +28,27 @@ class SessionManager {
     int64_t count;
   };
 
-  // Bindings are borrowed; so is what the environment points to.
+  // Bindings, with their store, are borrowed; so is what the environment points
+  // to. `patient` runs tasks soon, never inside the call, which may wait for
+  // weights: only sessions that were stored need it.
   SessionManager(BindingRegistry& bindings, const Limits& limits,
-                 SessionEnvironment environment);
+                 SessionEnvironment environment, Executor patient = {});
   // Ends what is left.
   ~SessionManager();
+
+  // Brings in what the store has, in a new epoch each, asleep (see Session);
+  // nobody else uses the manager yet. What cannot be read, or its binding, is
+  // lost until it is created again: DataLoss to whoever asks for it.
+  // ResourceExhausted if there is more than the limits allow; what the store
+  // refuses.
+  absl::StatusOr<Losses> Load(const std::vector<StoredSession>& sessions);
 
   // `id` may be empty: one is made. The session that is there if it has the
   // same binding, else AlreadyExists SESSION_EXISTS. Waits for weights that
   // were evicted. NotFound BINDING_NOT_FOUND, InvalidArgument BAD_NAME,
   // ResourceExhausted MEMORY_LIMIT, TOO_MANY_SESSIONS, TOO_MANY_BINDS,
-  // Cancelled, Unavailable SERVER_DRAINING.
+  // Cancelled, Unavailable SERVER_DRAINING, what the store refuses: then there
+  // is no session.
   absl::StatusOr<std::shared_ptr<Session>> Create(
       const std::string& tenant, const std::string& binding_id,
       const std::string& id, KeepWaiting keep_waiting = WaitForever);
@@ -53,24 +66,35 @@ class SessionManager {
             const std::vector<int32_t>& previous, std::vector<std::string> ids,
             RigMoves& moves);
 
-  // Ends its streams with NotFound SESSION_DELETED.
+  // Ends its streams with NotFound SESSION_DELETED. What the store refuses:
+  // then it goes on.
   absl::Status Delete(const std::string& tenant, const std::string& id);
 
   // No new sessions or participants; streams end with Unavailable
   // SERVER_DRAINING once the poses that came are answered.
   void Drain();
+  // Sessions that wake up wait for weights no longer.
+  void StopWaiting() { stopping_ = true; }
 
   SessionCatalogue& catalogue() { return sessions_; }
   const Clock& clock() const { return environment_.clock; }
 
  private:
+  Store& store() { return bindings_.store(); }
+  absl::Status LoadOne(const StoredSession& stored);
+  // Into the store, in the place of one that was lost.
+  absl::Status Put(const StoredSession& session);
+  absl::Status Insert(const std::string& tenant, const std::string& id,
+                      std::shared_ptr<Session> session);
   // The weights of this binding have another form.
   void Refresh(const BindingRecord& record);
 
-  const SessionEnvironment environment_;
+  SessionEnvironment environment_;
   BindingRegistry& bindings_;
   MemoryBudget budget_;
   SessionCatalogue sessions_;
+  Claims claims_;
+  std::atomic<bool> stopping_ = false;
   mutable Mutex mutex_;
   bool draining_ ABSL_GUARDED_BY(mutex_) = false;
 };

@@ -38,6 +38,7 @@ std::string CatalogueFile(const std::string& directory) {
 
 absl::Status BackupWriter::Begin() {
   DEFORM_RETURN_IF_ERROR(CheckNew(files_, target_));
+  DEFORM_RETURN_IF_ERROR(MakeDirectory(files_, FolderOf(target_)));
   return MakeNewDirectory(files_, partial());
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/mutex.h"
 #include "server/models/binding_registry.h"
 #include "server/models/model_registry.h"
 #include "server/stores/store.h"
@@ -26,6 +27,23 @@ inline absl::StatusOr<std::unique_ptr<Store>> OpenOn(SimulatedDisk& disk) {
   options.sqlite_vfs = disk.vfs();
   return (*FindStoreKind("sqlite"))->Open(options);
 }
+
+// What was told, on whatever thread.
+class Reports {
+ public:
+  void Add(const absl::Status& status) {
+    MutexLock lock(mutex_);
+    all_.push_back(status);
+  }
+  std::vector<absl::Status> all() const {
+    MutexLock lock(mutex_);
+    return all_;
+  }
+
+ private:
+  mutable Mutex mutex_;
+  std::vector<absl::Status> all_ ABSL_GUARDED_BY(mutex_);
+};
 
 // From opening the store to its end. Compressing and keeping weights runs when
 // told.
@@ -56,7 +74,7 @@ class Life {
             },
             {.executor = Later(), .is_worth = [](int64_t) { return true; }},
             {.executor = Later(), .report = [this](const absl::Status& status) {
-               reported.push_back(status);
+               reported.Add(status);
              }}) {}
 
   // Everything that is stored; what is lost.
@@ -98,7 +116,7 @@ class Life {
   BindingRegistry& bindings() { return bindings_; }
 
   int computed = 0;
-  std::vector<absl::Status> reported;
+  Reports reported;
 
  private:
   std::function<void(std::function<void()>)> Later() {

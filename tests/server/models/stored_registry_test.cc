@@ -289,7 +289,7 @@ TEST_P(StoredWeights, AreReadInTheNextLifeNotComputed) {
   EXPECT_EQ(state.compressed, GetParam() > 0);
   EXPECT_EQ(state.bytes, use.binding->weight_bytes());
   life.RunAll();
-  EXPECT_THAT(life.reported, IsEmpty());
+  EXPECT_THAT(life.reported.all(), IsEmpty());
 }
 
 INSTANTIATE_TEST_SUITE_P(InBothForms, StoredWeights, testing::Values(0, 1e-3));
@@ -316,8 +316,8 @@ TEST(StoredBindings, ComputeDamagedWeightsAgainAndKeepThem) {
     const BindingInUse use = life.bindings().Use("t", id, "a test").value();
     EXPECT_EQ(life.computed, 1);
     EXPECT_EQ(WeightsOf(*use.binding), weights);
-    ASSERT_EQ(life.reported.size(), 1u);
-    EXPECT_THAT(std::string(life.reported[0].message()),
+    ASSERT_EQ(life.reported.all().size(), 1u);
+    EXPECT_THAT(std::string(life.reported.all()[0].message()),
                 HasSubstr("are computed again"));
     life.RunAll();
   }
@@ -334,8 +334,8 @@ TEST(StoredBindings, ServeFromMemoryWhenTheDiskHasNoRoomForWeights) {
       life.Create(InCube(life.Register(Ball()).value())).value();
   disk.Inject({.kind = Kind::kError, .at = 0, .error = ENOSPC});
   life.RunAll();
-  ASSERT_EQ(life.reported.size(), 1u);
-  EXPECT_EQ(DetailOf(life.reported[0]).reason, "DISK_FULL");
+  ASSERT_EQ(life.reported.all().size(), 1u);
+  EXPECT_EQ(DetailOf(life.reported.all()[0]).reason, "DISK_FULL");
   EXPECT_TRUE(life.bindings().Use("t", created.record->id, "a test").ok());
   EXPECT_EQ(life.computed, 1);
 }

@@ -32,7 +32,7 @@ std::shared_ptr<Frame> TwoChunks() {
 
 v1::FrameChunk Parsed(const FrameToSend& send, size_t chunk) {
   v1::DeformResponse response;
-  EXPECT_TRUE(ParseMessage(FrameMessage(send, chunk, 4), response));
+  EXPECT_TRUE(ParseMessage(FrameMessage(send, chunk, 4, 3), response));
   EXPECT_TRUE(response.has_frame());
   EXPECT_EQ(response.GetReflection()->GetUnknownFields(response).field_count(),
             0);
@@ -47,6 +47,7 @@ TEST(FrameMessage, IsAValidMessage) {
   const v1::FrameChunk first = Parsed(send, 0);
   EXPECT_EQ(first.revision(), 300u);
   EXPECT_EQ(first.epoch(), 4u);
+  EXPECT_EQ(first.durable_revision(), 3u);
   EXPECT_EQ(first.answers_sequence(), 9u);
   EXPECT_EQ(first.encoding(), "float32");
   EXPECT_TRUE(first.keyframe());
@@ -80,7 +81,7 @@ TEST(FrameMessage, TellsNoOriginWithoutAKeyframe) {
 
 TEST(FrameMessage, DoesNotCopyTheData) {
   const auto frame = TwoChunks();
-  const grpc::ByteBuffer message = FrameMessage({.frame = frame}, 0, 1);
+  const grpc::ByteBuffer message = FrameMessage({.frame = frame}, 0, 1, 0);
   std::vector<grpc::Slice> slices;
   ASSERT_TRUE(message.Dump(&slices).ok());
   EXPECT_EQ(slices.back().begin(), frame->chunks[0].bytes.get());
@@ -90,7 +91,7 @@ TEST(FrameMessage, KeepsTheFrameUntilItIsSent) {
   auto frame = TwoChunks();
   const std::weak_ptr<Frame> alive = frame;
   {
-    const grpc::ByteBuffer message = FrameMessage({.frame = frame}, 0, 1);
+    const grpc::ByteBuffer message = FrameMessage({.frame = frame}, 0, 1, 0);
     frame.reset();
     EXPECT_FALSE(alive.expired());
   }

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdlib>
-#include <map>
-#include <optional>
+#include <filesystem>
+#include <fstream>
 #include <random>
 #include <set>
 #include <string>
@@ -18,7 +18,9 @@
 #include "client/cpp/client.h"
 #include "core/base/error.h"
 #include "core/deform/deformer.h"
+#include "deform/v1/server.grpc.pb.h"
 #include "tests/end_to_end/process.h"
+#include "tests/end_to_end/raw_call.h"
 #include "tests/end_to_end/running_server.h"
 #include "tests/support/temporary_folder.h"
 
@@ -347,6 +349,31 @@ TEST(Backups, AreNotMadeOfAServerThatKeepsNothing) {
   RunningServer server;
   EXPECT_EQ(DetailOf(server.client().Backup("monday").status()).reason,
             "NOTHING_STORED");
+}
+
+uint64_t CollectOrphans(const std::string& address) {
+  const auto stub = v1::ServerService::NewStub(PlainChannel(address));
+  grpc::ClientContext context;
+  v1::CollectOrphansResponse response;
+  EXPECT_TRUE(
+      stub->CollectOrphans(&context, v1::CollectOrphansRequest(), &response)
+          .ok());
+  return response.files_removed();
+}
+
+TEST(Orphans, AreRemovedWhileTheServerServes) {
+  const std::string path = Temporary().Path("orphans");
+  Daemon daemon(DataDir(path));
+  Client client = Client::Connect(daemon.address()).value();
+  const BindingInfo binding = RunningServer::BindBall(client);
+  EXPECT_EQ(CollectOrphans(daemon.address()), 0u);
+  const std::string orphan = path + "/models/default/m-nobody";
+  std::ofstream(orphan) << "of a crash";
+  EXPECT_EQ(CollectOrphans(daemon.address()), 1u);
+  EXPECT_FALSE(std::filesystem::exists(orphan));
+  EXPECT_TRUE(client.GetRig(binding.binding_id).ok());
+  EXPECT_TRUE(
+      std::filesystem::exists(path + "/models/default/" + binding.model_id));
 }
 
 TEST_F(Crashes, LeaveADirectoryThatAnotherServerDoesNotTake) {

@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cerrno>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/error.h"
@@ -280,6 +283,83 @@ TEST(StoredSessions, KeepTheRigThatTheyMovedTo) {
   EXPECT_EQ(life.Find("s")->state().binding_id, larger);
   EXPECT_EQ(life.Find("s")->state().revision, 2u);
   EXPECT_EQ(life.Find("s")->posed().pose.vertices, pose);
+}
+
+// What a life with a fault acknowledged.
+struct Told {
+  absl::Status created;
+  uint64_t durable = 0;
+  std::vector<Positions> poses;  // By revision.
+  int64_t calls = 0;             // To the disk.
+};
+
+// Creates a session and poses it three times, while the disk has this fault.
+Told LiveWith(SimulatedDisk& disk,
+              const std::optional<SimulatedDisk::Fault>& fault) {
+  Told told;
+  SessionLife life(disk);
+  const std::string binding = life.BindBall().value();
+  const int64_t before = disk.calls();
+  if (fault) disk.Inject(*fault);
+  told.created = life.Create(binding, "s");
+  if (told.created.ok()) {
+    told.poses = {life.Find("s")->posed().pose.vertices};
+    FakeStream& stream = life.Join("s");
+    life.Run();
+    for (uint64_t i = 1; i <= 3; ++i) {
+      stream.participant->Submit(
+          i, i == 2 ? MoveVertex(3, {5, 6, 7})
+                    : MovedBy({static_cast<double>(i), 0, 0}));
+      life.Run();
+      told.poses.push_back(life.Find("s")->posed().pose.vertices);
+      life.Sync().IgnoreError();
+    }
+    const SessionState state = life.Find("s")->state();
+    EXPECT_EQ(state.revision, 3u);
+    told.durable = state.durable_revision;
+  }
+  told.calls = disk.calls() - before;
+  return told;
+}
+
+void ExpectKept(SimulatedDisk& disk, const Told& told) {
+  SessionLife life(disk);
+  EXPECT_THAT(life.Load().value(), IsEmpty());
+  if (!told.created.ok()) {
+    EXPECT_THAT(DetailOf(told.created).reason,
+                testing::AnyOf("STORE_FAILED", "DISK_FULL"));
+    return;
+  }
+  const SessionState state = life.Find("s")->state();
+  EXPECT_GE(state.revision, told.durable);
+  ASSERT_LT(state.revision, told.poses.size());
+  EXPECT_EQ(life.Find("s")->posed().pose.vertices, told.poses[state.revision]);
+}
+
+TEST(StoredSessions, AreWholeWhicheverCallToTheDiskFails) {
+  SimulatedDisk sound;
+  const Told all = LiveWith(sound, std::nullopt);
+  EXPECT_EQ(all.durable, 3u);
+  EXPECT_GT(all.calls, 10);
+  for (const Kind kind :
+       {Kind::kError, Kind::kTorn, Kind::kShort, Kind::kPowerLoss}) {
+    for (const int error : {EIO, ENOSPC}) {
+      for (int64_t at = 0; at < all.calls; ++at) {
+        SCOPED_TRACE(absl::StrCat("call ", at, " of ", all.calls, ", kind ",
+                                  static_cast<int>(kind), ", errno ", error));
+        SimulatedDisk disk;
+        const Told told =
+            LiveWith(disk, {{.kind = kind, .at = at, .error = error}});
+        if (kind == Kind::kPowerLoss) {
+          disk.Restart(static_cast<uint64_t>(at));
+        } else {
+          disk.EndProcess();
+        }
+        ExpectKept(disk, told);
+        if (HasFailure()) return;
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -10,6 +10,7 @@ namespace deform::server {
 
 std::shared_ptr<WeightsCache::Slot> WeightsCache::MakeSlot() {
   std::shared_ptr<Slot> slot(new Slot(*this));
+  slot->last_use_ = absl::Now();  // Weights may be in the store only.
   MutexLock lock(mutex_);
   slot->place_ = slots_.insert(slots_.end(), slot.get());
   return slot;

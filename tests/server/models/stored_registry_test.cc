@@ -209,7 +209,9 @@ TEST(StoredBindings, AreTheSameInTheNextLife) {
   EXPECT_THAT(life.Load().value(), IsEmpty());
   for (const auto& [id, expected] : bytes) {
     EXPECT_EQ(BytesOf(*life.Find(id)), expected);
-    EXPECT_FALSE(life.Find(id)->weights->state().resident);
+    const auto weights = life.Find(id)->weights->state();
+    EXPECT_FALSE(weights.resident);
+    EXPECT_GE(weights.last_use, life.Find(id)->create_time);
   }
   const auto model_id = life.Find(bytes[0].first)->model_id;
   EXPECT_EQ(DetailOf(life.models().Remove("t", model_id)).reason,

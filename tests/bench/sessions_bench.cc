@@ -138,7 +138,7 @@ class Bound {
   std::string id;
 
  private:
-  const std::unique_ptr<Store> store_ = MemoryStore();
+  const std::unique_ptr<server::Store> store_ = server::MemoryStore();
   ModelRegistry models_{
       {.model_bytes = 1 << 28, .memory = 1 << 28, .count = 10}, *store_};
   ThreadPool binds_{{}};

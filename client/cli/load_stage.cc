@@ -99,7 +99,7 @@ absl::StatusOr<PosePattern> MakePattern(const LoadStageOptions& options,
 // Compressed weights are off by their tolerance times a displacement, which is
 // no larger than the rig, at rest or posed: the unit of FrameJudge.
 double Allowed(const LoadStageOptions& options, const BindingInfo& binding) {
-  return options.tolerance + binding.weight_tolerance;
+  return options.tolerance + binding.weight_tolerance + options.frame_tolerance;
 }
 
 }  // namespace

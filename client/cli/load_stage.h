@@ -25,7 +25,8 @@ struct LoadStageOptions {
   int editors = 1;
   double rate = 60;
   bool check = true;
-  double tolerance = 1e-6;  // Beside that of compressed weights.
+  double tolerance = 1e-6;  // Beside that of compressed weights and:
+  double frame_tolerance = 0;
 };
 
 // "drag", "jitter", "whole", "recorded".

@@ -67,6 +67,11 @@ Json ChecksJson(const LoadSubject& subject, const LoadReport& report) {
   return json;
 }
 
+double BytesPerFrame(const LoadFigures& figures) {
+  return static_cast<double>(figures.bytes) /
+         static_cast<double>(std::max<int64_t>(1, figures.frames));
+}
+
 std::string LateWarning(const LoadReport& report) {
   return absl::StrFormat(
       "THE CLIENT WAS LATE: it sent %.1f %% of the poses more than 1 ms after "
@@ -110,47 +115,49 @@ Json ToJson(const LoadSubject& subject, const LoadReport& report) {
     seconds.push_back(std::move(one));
   }
   const std::string failure = LoadFailure(subject, report);
-  return {
-      {"ok", failure.empty()},
-      {"failure", failure},
-      {"sessions", options.sessions},
-      {"editors", options.editors},
-      {"viewers", options.viewers},
-      {"rate", options.rate},
-      {"delivery", options.delivery == Delivery::kEvery ? "every" : "latest"},
-      {"pattern", subject.pattern},
-      {"scheme", subject.scheme},
-      {"models", subject.models},
-      {"point_count", subject.points},
-      {"column_count", subject.columns},
-      {"connections", report.connections},
-      {"seconds", report.seconds},
-      {"latency_ms", LatencyJson(figures.Latency())},
-      {"latency_ms_over_time", std::move(seconds)},
-      {"poses",
-       {{"due", report.poses_due},
-        {"sent", report.poses_sent},
-        {"answered", report.poses_answered}}},
-      {"frames", figures.frames},
-      {"frames_per_second", PerSecond(figures.frames, report.seconds)},
-      {"bytes", figures.bytes},
-      {"bytes_per_second", PerSecond(figures.bytes, report.seconds)},
-      {"skipped_revisions", figures.skipped},
-      {"deform_us_mean",
-       static_cast<double>(figures.deform_us) /
-           static_cast<double>(std::max<int64_t>(1, figures.answering))},
-      {"server",
-       {{"processors_used", report.server_cpus},
-        {"processors", report.server_processors},
-        {"resident_bytes_begin", report.server_resident_begin},
-        {"resident_bytes_peak", report.server_resident_peak}}},
-      {"client",
-       {{"kept_schedule", report.kept_schedule()},
-        {"late_part", report.LatePart()},
-        {"lateness_ms", LatencyJson(figures.lateness)},
-        {"held_back", figures.held_back},
-        {"processors_used", report.client_cpus}}},
-      {"checks", ChecksJson(subject, report)}};
+  return {{"ok", failure.empty()},
+          {"failure", failure},
+          {"sessions", options.sessions},
+          {"editors", options.editors},
+          {"viewers", options.viewers},
+          {"rate", options.rate},
+          {"delivery",
+           options.frames.delivery == Delivery::kEvery ? "every" : "latest"},
+          {"pattern", subject.pattern},
+          {"scheme", subject.scheme},
+          {"models", subject.models},
+          {"point_count", subject.points},
+          {"column_count", subject.columns},
+          {"connections", report.connections},
+          {"seconds", report.seconds},
+          {"latency_ms", LatencyJson(figures.Latency())},
+          {"latency_ms_over_time", std::move(seconds)},
+          {"poses",
+           {{"due", report.poses_due},
+            {"sent", report.poses_sent},
+            {"answered", report.poses_answered}}},
+          {"frames", figures.frames},
+          {"frames_per_second", PerSecond(figures.frames, report.seconds)},
+          {"bytes", figures.bytes},
+          {"bytes_per_frame", BytesPerFrame(figures)},
+          {"frame_tolerance", options.frames.tolerance_fraction.value_or(0)},
+          {"bytes_per_second", PerSecond(figures.bytes, report.seconds)},
+          {"skipped_revisions", figures.skipped},
+          {"deform_us_mean",
+           static_cast<double>(figures.deform_us) /
+               static_cast<double>(std::max<int64_t>(1, figures.answering))},
+          {"server",
+           {{"processors_used", report.server_cpus},
+            {"processors", report.server_processors},
+            {"resident_bytes_begin", report.server_resident_begin},
+            {"resident_bytes_peak", report.server_resident_peak}}},
+          {"client",
+           {{"kept_schedule", report.kept_schedule()},
+            {"late_part", report.LatePart()},
+            {"lateness_ms", LatencyJson(figures.lateness)},
+            {"held_back", figures.held_back},
+            {"processors_used", report.client_cpus}}},
+          {"checks", ChecksJson(subject, report)}};
 }
 
 void Describe(const LoadSubject& subject, const LoadReport& report,
@@ -165,7 +172,7 @@ void Describe(const LoadSubject& subject, const LoadReport& report,
            "%s, each %s at %g Hz (%s, %s) and %s, over %s",
            Counted(options.sessions, "session"),
            Counted(options.editors, "editor"), options.rate, subject.pattern,
-           options.delivery == Delivery::kEvery ? "every" : "latest",
+           options.frames.delivery == Delivery::kEvery ? "every" : "latest",
            Counted(options.viewers, "viewer"),
            Counted(report.connections, "connection")));
   line("models",
@@ -180,7 +187,9 @@ void Describe(const LoadSubject& subject, const LoadReport& report,
   line("frames",
        absl::StrCat(RatePerSecond(figures.frames, report.seconds), "/s, ",
                     BytesPerSecond(figures.bytes, report.seconds), ", ",
-                    Thousands(figures.skipped), " revisions skipped"));
+                    Bytes(static_cast<int64_t>(BytesPerFrame(figures))),
+                    " each, ", Thousands(figures.skipped),
+                    " revisions skipped"));
   line("poses", absl::StrCat(Thousands(report.poses_due), " due, ",
                              Thousands(report.poses_sent), " sent, ",
                              Thousands(report.poses_answered), " answered"));

@@ -93,8 +93,8 @@ class Player {
     }
     ++report_.frames;
     report_.skipped_revisions += frame.skipped_revisions;
-    report_.bytes +=
-        static_cast<int64_t>(frame.positions.size() * sizeof(float));
+    report_.bytes += frame.bytes;
+    ++report_.encodings[frame.encoding];
     report_.deform_us += frame.deform_us;
     report_.columns_applied += frame.columns_applied;
     report_.exit_mismatch_max =

@@ -5,6 +5,8 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -27,7 +29,8 @@ struct PlayReport {
   int64_t frames = 0;  // That answer poses.
   uint64_t skipped_revisions = 0;
   double seconds = 0;  // From the first pose to the last frame.
-  int64_t bytes = 0;   // Of positions.
+  int64_t bytes = 0;   // Of positions, encoded.
+  std::map<std::string, int64_t> encodings;  // How many frames came in each.
   int64_t deform_us = 0;
   int64_t columns_applied = 0;
   double exit_mismatch_max = 0;

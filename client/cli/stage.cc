@@ -101,10 +101,10 @@ Stage::~Stage() {
   Close().IgnoreError();
 }
 
-absl::StatusOr<Frame> Stage::DeformOnce(const PoseUpdate& pose) {
-  DEFORM_ASSIGN_OR_RETURN(
-      DeformStream stream,
-      client_.Deform(session_.session_id, Delivery::kEvery));
+absl::StatusOr<Frame> Stage::DeformOnce(const PoseUpdate& pose,
+                                        const DeformOptions& options) {
+  DEFORM_ASSIGN_OR_RETURN(DeformStream stream,
+                          client_.Deform(session_.session_id, options));
   DEFORM_ASSIGN_OR_RETURN(const uint64_t sequence, stream.Send(pose));
   Frame frame;
   do {

@@ -41,7 +41,9 @@ class Stage {
   const std::optional<MeshFile>& model() const { return model_; }
 
   // The frame of one pose of the session.
-  absl::StatusOr<Frame> DeformOnce(const PoseUpdate& pose);
+  absl::StatusOr<Frame> DeformOnce(const PoseUpdate& pose,
+                                   const DeformOptions& options = {
+                                       .delivery = Delivery::kEvery});
 
   // At every point the weight of a vertex of the rig, or of the normal of a
   // face. A usage error if there is none.

@@ -92,18 +92,26 @@ struct Client::Impl {
     return response;
   }
 
-  v1::Join JoinOf(absl::string_view session_id, Delivery delivery,
-                  const std::vector<std::string>& encodings) const {
+  v1::Join JoinOf(absl::string_view session_id,
+                  const DeformOptions& wanted) const {
     v1::Join join;
     join.set_tenant(options.tenant);
     join.set_session_id(ToString(session_id));
-    join.set_delivery(delivery == Delivery::kEvery ? v1::DELIVERY_EVERY
-                                                   : v1::DELIVERY_LATEST);
-    join.mutable_encodings()->Add(encodings.begin(), encodings.end());
-    if (!encodings.empty()) return join;
+    join.set_delivery(wanted.delivery == Delivery::kEvery
+                          ? v1::DELIVERY_EVERY
+                          : v1::DELIVERY_LATEST);
+    if (wanted.tolerance) join.set_tolerance(*wanted.tolerance);
+    if (wanted.tolerance_fraction) {
+      join.set_tolerance_fraction(*wanted.tolerance_fraction);
+    }
+    join.mutable_encodings()->Add(wanted.encodings.begin(),
+                                  wanted.encodings.end());
+    if (!wanted.encodings.empty()) return join;
+    const bool inexact = wanted.tolerance || wanted.tolerance_fraction;
+    join.set_cheapest_encoding(inexact);
     for (const FrameEncoding* encoding : AllEncodings()) {
-      // Others need a tolerance, which is not negotiated yet.
-      if (encoding->is_exact()) join.add_encodings(ToString(encoding->id()));
+      if (!inexact && !encoding->is_exact()) continue;
+      join.add_encodings(ToString(encoding->id()));
     }
     return join;
   }
@@ -429,17 +437,22 @@ absl::StatusOr<std::string> Client::Backup(absl::string_view name) {
 }
 
 absl::StatusOr<DeformStream> Client::Deform(absl::string_view session_id,
-                                            Delivery delivery) {
+                                            const DeformOptions& options) {
   auto stream = std::make_unique<DeformStream::Impl>(*impl_->sessions);
-  DEFORM_RETURN_IF_ERROR(stream->Join(impl_->JoinOf(session_id, delivery, {})));
+  DEFORM_RETURN_IF_ERROR(stream->Join(impl_->JoinOf(session_id, options)));
   return DeformStream(std::move(stream));
 }
 
-std::unique_ptr<DeformCall> Client::StartDeform(
-    absl::string_view session_id, Delivery delivery,
-    const std::vector<std::string>& encodings, DeformEvents& events) {
-  return StartDeformCall(
-      *impl_->sessions, impl_->JoinOf(session_id, delivery, encodings), events);
+absl::StatusOr<DeformStream> Client::Deform(absl::string_view session_id,
+                                            Delivery delivery) {
+  return Deform(session_id, DeformOptions{.delivery = delivery});
+}
+
+std::unique_ptr<DeformCall> Client::StartDeform(absl::string_view session_id,
+                                                const DeformOptions& options,
+                                                DeformEvents& events) {
+  return StartDeformCall(*impl_->sessions, impl_->JoinOf(session_id, options),
+                         events);
 }
 
 }  // namespace deform

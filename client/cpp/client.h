@@ -148,13 +148,14 @@ class Client {
 
   // Joins a session: poses in, frames out.
   absl::StatusOr<DeformStream> Deform(absl::string_view session_id,
+                                      const DeformOptions& options);
+  absl::StatusOr<DeformStream> Deform(absl::string_view session_id,
                                       Delivery delivery = Delivery::kLatest);
   // The same without a thread that waits, for programs with many streams
-  // (deform_call.h). `encodings` that are taken, best first; empty: all.
-  // `events` is borrowed.
-  std::unique_ptr<DeformCall> StartDeform(
-      absl::string_view session_id, Delivery delivery,
-      const std::vector<std::string>& encodings, DeformEvents& events);
+  // (deform_call.h). `events` is borrowed.
+  std::unique_ptr<DeformCall> StartDeform(absl::string_view session_id,
+                                          const DeformOptions& options,
+                                          DeformEvents& events);
 
  private:
   struct Impl;

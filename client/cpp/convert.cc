@@ -368,6 +368,7 @@ absl::StatusOr<JoinedSession> FromProto(const v1::Joined& joined) {
       .session_id = joined.session().session_id(),
       .binding_id = joined.session().binding_id(),
       .encoding = joined.encoding(),
+      .tolerance = joined.tolerance(),
       .dimension = static_cast<int>(joined.dimension()),
       .point_count = static_cast<int64_t>(joined.point_count()),
       .vertex_count = joined.vertex_count(),

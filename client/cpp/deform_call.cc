@@ -97,6 +97,9 @@ class Call final
         return HandleJoined();
       case v1::DeformResponse::kFrame:
         return HandleFrame();
+      case v1::DeformResponse::kPointOrder:
+        if (!assembler_) return NotJoined();
+        return assembler_->AddOrder(response_.point_order());
       case v1::DeformResponse::kRigChanged: {
         DEFORM_ASSIGN_OR_RETURN(const RigChange change,
                                 FromProto(response_.rig_changed(), dimension_));
@@ -114,15 +117,14 @@ class Call final
     }
   }
 
+  static absl::Status NotJoined() {
+    return absl::InternalError("the server did not answer a join");
+  }
+
   absl::Status HandleJoined() {
     DEFORM_ASSIGN_OR_RETURN(const JoinedSession joined,
                             FromProto(response_.joined()));
-    const FrameEncoding* encoding =
-        FindEncoding({joined.encoding.data(), joined.encoding.size()});
-    if (encoding == nullptr || !encoding->is_exact()) {
-      return absl::InternalError("the server picked an unknown frame encoding");
-    }
-    assembler_.emplace(*encoding, joined.dimension, joined.point_count);
+    assembler_.emplace(joined.dimension, joined.point_count);
     {
       MutexLock lock(mutex_);
       dimension_ = joined.dimension;
@@ -133,14 +135,10 @@ class Call final
   }
 
   absl::Status HandleFrame() {
-    if (!assembler_) {
-      return absl::InternalError("the server did not answer a join");
-    }
-    const v1::FrameChunk& chunk = response_.frame();
-    bytes_ += static_cast<int64_t>(chunk.data().size());
+    if (!assembler_) return NotJoined();
     DEFORM_ASSIGN_OR_RETURN(const bool complete,
-                            assembler_->Add(chunk, frame_));
-    if (complete) events_.OnFrame(frame_, std::exchange(bytes_, 0));
+                            assembler_->Add(response_.frame(), frame_));
+    if (complete) events_.OnFrame(frame_);
     return absl::OkStatus();
   }
 
@@ -162,7 +160,6 @@ class Call final
   v1::DeformResponse response_;
   std::optional<FrameAssembler> assembler_;
   Frame frame_;
-  int64_t bytes_ = 0;  // Of the frame so far.
   absl::Status in_band_;
 
   Mutex mutex_;

@@ -17,8 +17,7 @@ class DeformEvents {
   virtual ~DeformEvents() = default;
   // The first.
   virtual void OnJoined(const JoinedSession& joined) = 0;
-  // `bytes` of the frame's chunks as they came, encoded.
-  virtual void OnFrame(const Frame& frame, int64_t bytes) = 0;
+  virtual void OnFrame(const Frame& frame) = 0;
   virtual void OnRejected(uint64_t sequence, const absl::Status& status) = 0;
   virtual void OnRigChange(const RigChange& change) = 0;
   // The pose under way has been sent: there is room for the next.

@@ -42,12 +42,7 @@ absl::Status DeformStream::Impl::Join(const v1::Join& join) {
     return absl::InternalError("the server did not answer a join");
   }
   DEFORM_ASSIGN_OR_RETURN(joined_, FromProto(response_.joined()));
-  const FrameEncoding* encoding =
-      FindEncoding({joined_.encoding.data(), joined_.encoding.size()});
-  if (encoding == nullptr || !encoding->is_exact()) {
-    return absl::InternalError("the server picked an unknown frame encoding");
-  }
-  assembler_.emplace(*encoding, joined_.dimension, joined_.point_count);
+  assembler_.emplace(joined_.dimension, joined_.point_count);
   return absl::OkStatus();
 }
 
@@ -72,17 +67,32 @@ absl::StatusOr<uint64_t> DeformStream::Impl::Send(const PoseUpdate& update,
   return sequence_;
 }
 
+absl::Status DeformStream::Impl::RequestKeyframe() {
+  if (closed_) {
+    return absl::FailedPreconditionError("nothing can follow Close()");
+  }
+  v1::DeformRequest request;
+  request.mutable_keyframe();
+  if (!call_->Write(request)) {
+    return absl::UnavailableError(
+        "the stream has ended; receiving tells the reason");
+  }
+  return absl::OkStatus();
+}
+
+absl::Status DeformStream::Impl::Refuse(const absl::Status& status) {
+  context_.TryCancel();
+  in_band_ = status;
+  return End();
+}
+
 absl::Status DeformStream::Impl::NextFrame(Frame& frame) {
   while (!ended_ && call_->Read(&response_)) {
     switch (response_.message_case()) {
       case v1::DeformResponse::kFrame: {
         const absl::StatusOr<bool> complete =
             assembler_->Add(response_.frame(), frame);
-        if (!complete.ok()) {
-          context_.TryCancel();
-          in_band_ = complete.status();
-          return End();
-        }
+        if (!complete.ok()) return Refuse(complete.status());
         if (!*complete) break;
         told_changes_ = rig_changes_.size();
         return absl::OkStatus();
@@ -90,12 +100,14 @@ absl::Status DeformStream::Impl::NextFrame(Frame& frame) {
       case v1::DeformResponse::kRigChanged: {
         absl::StatusOr<RigChange> change =
             FromProto(response_.rig_changed(), joined_.dimension);
-        if (!change.ok()) {
-          context_.TryCancel();
-          in_band_ = change.status();
-          return End();
-        }
+        if (!change.ok()) return Refuse(change.status());
         rig_changes_.push_back(*std::move(change));
+        break;
+      }
+      case v1::DeformResponse::kPointOrder: {
+        const absl::Status status =
+            assembler_->AddOrder(response_.point_order());
+        if (!status.ok()) return Refuse(status);
         break;
       }
       case v1::DeformResponse::kRejected:
@@ -138,6 +150,9 @@ absl::StatusOr<uint64_t> DeformStream::Send(const PoseUpdate& update) {
 absl::StatusOr<uint64_t> DeformStream::Send(const PoseUpdate& update,
                                             uint64_t rig_changes) {
   return impl_->Send(update, rig_changes);
+}
+absl::Status DeformStream::RequestKeyframe() {
+  return impl_->RequestKeyframe();
 }
 const std::vector<RigChange>& DeformStream::rig_changes() const {
   return impl_->rig_changes();

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,19 @@ namespace deform {
 enum class Delivery {
   kLatest,  // The newest state whenever there is room; poses may merge.
   kEvery,   // A frame for each pose, in order.
+};
+
+// How to join a session. By default frames are exact to float32.
+struct DeformOptions {
+  Delivery delivery = Delivery::kLatest;
+  // How far a vertex may come out from its place, in model units or as a
+  // fraction of the rig's diagonal at rest; at most one of them. Frames then
+  // take a fraction of the bytes.
+  std::optional<double> tolerance;
+  std::optional<double> tolerance_fraction;
+  // Frame encodings to choose from, best first (frame.proto). Empty: "float32",
+  // or, with a tolerance, whichever takes fewest bytes.
+  std::vector<std::string> encodings;
 };
 
 // The deformed model of one revision of the session.
@@ -40,6 +54,13 @@ struct Frame {
   double exit_mismatch = 0;
   // What the server spent deforming.
   int64_t deform_us = 0;
+  std::string encoding;
+  int64_t bytes = 0;  // As they came, encoded.
+  // Shown without another frame.
+  bool keyframe = false;
+  // How far compressed weights and the encoding may have moved any vertex, in
+  // model units, beside roundings to float.
+  double error_bound = 0;
 
   int64_t point_count() const {
     return static_cast<int64_t>(positions.size()) / dimension;
@@ -68,6 +89,7 @@ struct JoinedSession {
   std::string session_id;
   std::string binding_id;
   std::string encoding;
+  double tolerance = 0;  // Model units; 0: the encoding is exact.
   int dimension = 3;
   int64_t point_count = 0;
   int64_t vertex_count = 0;  // Rows of a pose.
@@ -102,6 +124,11 @@ class DeformStream {
   // rig is taken over to the present one, handle by handle.
   absl::StatusOr<uint64_t> Send(const PoseUpdate& update);
   absl::StatusOr<uint64_t> Send(const PoseUpdate& update, uint64_t rig_changes);
+
+  // Asks for a frame that refers to no other; it comes without a pose, too.
+  // Part of the sending side. Frames need none: it serves those who record
+  // them.
+  absl::Status RequestKeyframe();
 
   // Waits for the next frame and puts it into `frame`, whose memory is reused.
   // The first shows the session as it is at joining. Otherwise returns

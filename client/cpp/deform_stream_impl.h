@@ -24,6 +24,7 @@ class DeformStream::Impl {
 
   const JoinedSession& joined() const { return joined_; }
   absl::StatusOr<uint64_t> Send(const PoseUpdate& update, uint64_t rig_changes);
+  absl::Status RequestKeyframe();
   uint64_t told_changes() const { return told_changes_; }
   const std::vector<RigChange>& rig_changes() const { return rig_changes_; }
   absl::Status NextFrame(Frame& frame);
@@ -33,6 +34,8 @@ class DeformStream::Impl {
   void Cancel() { context_.TryCancel(); }
 
  private:
+  // What came cannot be: ends the stream with this.
+  absl::Status Refuse(const absl::Status& status);
   absl::Status End();
 
   grpc::ClientContext context_;

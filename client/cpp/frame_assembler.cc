@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/error.h"
@@ -15,23 +16,50 @@ absl::Status BadFrame(const Parts&... parts) {
   return InvalidInput("BAD_FRAME", "frame", absl::StrCat(parts...));
 }
 
+std::span<const uint8_t> BytesOf(const std::string& data) {
+  return {reinterpret_cast<const uint8_t*>(data.data()), data.size()};
+}
+
 }  // namespace
 
-FrameAssembler::FrameAssembler(const FrameEncoding& encoding, int dimension,
-                               int64_t point_count)
-    : encoding_(encoding), dimension_(dimension), point_count_(point_count) {}
+absl::Status FrameAssembler::AddOrder(const v1::PointOrderChunk& chunk) {
+  const auto bytes = BytesOf(chunk.data());
+  const auto needed = static_cast<uint64_t>(point_count_) * sizeof(int32_t);
+  if (order_ || chunk.first() != order_bytes_.size() / sizeof(int32_t) ||
+      bytes.empty() || bytes.size() % sizeof(int32_t) != 0 ||
+      bytes.size() > needed - order_bytes_.size()) {
+    return InvalidInput(
+        "BAD_POINT_ORDER", "point_order",
+        absl::StrCat("the order goes on at point ", chunk.first(), " with ",
+                     bytes.size(), " bytes, where ",
+                     order_bytes_.size() / sizeof(int32_t), " of ",
+                     point_count_, " points were reached",
+                     order_ ? ": it was complete" : ""));
+  }
+  order_bytes_.insert(order_bytes_.end(), bytes.begin(), bytes.end());
+  if (order_bytes_.size() < needed) return absl::OkStatus();
+  DEFORM_ASSIGN_OR_RETURN(order_,
+                          PointOrder::FromBytes(order_bytes_, point_count_));
+  order_bytes_ = {};
+  return absl::OkStatus();
+}
 
 absl::Status FrameAssembler::Begin(const v1::FrameChunk& chunk, Frame& frame) {
-  if (chunk.keyframe()) {
+  if (chunk.origin_size() > 0) {
     if (chunk.origin_size() != dimension_) {
-      return BadFrame("a keyframe's origin has ", chunk.origin_size(),
+      return BadFrame("a frame's origin has ", chunk.origin_size(),
                       " numbers, not ", dimension_);
     }
     origin_.setZero();
     std::copy(chunk.origin().begin(), chunk.origin().end(), origin_.data());
     have_origin_ = true;
   }
-  if (!have_origin_) return BadFrame("the first frame is no keyframe");
+  if (!have_origin_) return BadFrame("the first frame tells no origin");
+  encoding_ = FindEncoding(chunk.encoding());
+  if (encoding_ == nullptr) {
+    return BadFrame("encoding \"", chunk.encoding(), "\" is not known");
+  }
+  if (encoding_->uses_grid()) DEFORM_RETURN_IF_ERROR(BeginOnGrid(chunk));
   revision_ = chunk.revision();
   frame.revision = chunk.revision();
   frame.epoch = chunk.epoch();
@@ -44,6 +72,37 @@ absl::Status FrameAssembler::Begin(const v1::FrameChunk& chunk, Frame& frame) {
   frame.columns_applied = chunk.columns_applied();
   frame.exit_mismatch = chunk.exit_mismatch();
   frame.deform_us = chunk.deform_us();
+  frame.encoding = chunk.encoding();
+  frame.bytes = 0;
+  frame.keyframe = chunk.keyframe();
+  frame.error_bound = chunk.error_bound();
+  return absl::OkStatus();
+}
+
+absl::Status FrameAssembler::BeginOnGrid(const v1::FrameChunk& chunk) {
+  if (!order_) return BadFrame("the order of points has not come");
+  predicted_ = !chunk.keyframe();
+  if (predicted_ && (!held_ || held_->revision != chunk.reference_revision())) {
+    return BadFrame("revision ", chunk.revision(), " refers to revision ",
+                    chunk.reference_revision(), ", which is not held");
+  }
+  if (!CheckTolerance(chunk.step()).ok()) {
+    return BadFrame("the grid has step ", chunk.step());
+  }
+  step_ = chunk.step();
+  if (!grid_) grid_.emplace(point_count_);
+  return absl::OkStatus();
+}
+
+absl::Status FrameAssembler::CheckFollows(const v1::FrameChunk& chunk) const {
+  if (chunk.revision() != revision_) {
+    return BadFrame("revision ", chunk.revision(), " begins within revision ",
+                    revision_);
+  }
+  if (chunk.encoding() != encoding_->id()) {
+    return BadFrame("encoding \"", chunk.encoding(), "\" within one of \"",
+                    encoding_->id(), "\"");
+  }
   return absl::OkStatus();
 }
 
@@ -53,13 +112,10 @@ absl::StatusOr<bool> FrameAssembler::Add(const v1::FrameChunk& chunk,
   if (chunk.epoch() > newest_epoch_) {
     newest_epoch_ = chunk.epoch();
     next_vertex_ = 0;
+    held_.reset();
   }
-  if (next_vertex_ == 0) {
-    DEFORM_RETURN_IF_ERROR(Begin(chunk, frame));
-  } else if (chunk.revision() != revision_) {
-    return BadFrame("revision ", chunk.revision(), " begins within revision ",
-                    revision_);
-  }
+  DEFORM_RETURN_IF_ERROR(next_vertex_ == 0 ? Begin(chunk, frame)
+                                           : CheckFollows(chunk));
   const auto left = static_cast<uint64_t>(point_count_ - next_vertex_);
   if (chunk.first_vertex() != static_cast<uint64_t>(next_vertex_) ||
       chunk.vertex_count() > left ||
@@ -68,24 +124,42 @@ absl::StatusOr<bool> FrameAssembler::Add(const v1::FrameChunk& chunk,
                     " on, ", chunk.vertex_count(), " of them, where ",
                     next_vertex_, " of ", point_count_, " were reached");
   }
-  const auto count = static_cast<int64_t>(chunk.vertex_count());
-  DEFORM_RETURN_IF_ERROR(encoding_.Decode(
-      {reinterpret_cast<const uint8_t*>(chunk.data().data()),
-       chunk.data().size()},
-      {.dimension = dimension_,
-       .first = next_vertex_,
-       .count = count,
-       .positions =
-           std::span<float>(frame.positions)
-               .subspan(next_vertex_ * dimension_, count * dimension_)}));
-  next_vertex_ += count;
+  DEFORM_RETURN_IF_ERROR(Decode(chunk, frame));
+  frame.bytes += static_cast<int64_t>(chunk.data().size());
+  next_vertex_ += static_cast<int64_t>(chunk.vertex_count());
   if (!chunk.last()) return false;
   if (next_vertex_ != point_count_) {
     return BadFrame("a frame ends after ", next_vertex_, " of ", point_count_,
                     " vertices");
   }
+  if (encoding_->uses_grid()) FinishOnGrid(frame);
   next_vertex_ = 0;
   return true;
+}
+
+absl::Status FrameAssembler::Decode(const v1::FrameChunk& chunk, Frame& frame) {
+  const auto count = static_cast<int64_t>(chunk.vertex_count());
+  ChunkTarget target{
+      .dimension = dimension_, .first = next_vertex_, .count = count};
+  if (encoding_->uses_grid()) {
+    target.grid = &*grid_;
+    if (predicted_) target.reference = &held_->grid;
+  } else {
+    target.positions =
+        std::span<float>(frame.positions)
+            .subspan(next_vertex_ * dimension_, count * dimension_);
+  }
+  return encoding_->Decode(BytesOf(chunk.data()), target);
+}
+
+void FrameAssembler::FinishOnGrid(Frame& frame) {
+  TakeOffGrid(*grid_, step_, *order_, dimension_, frame.positions);
+  if (held_) {
+    std::swap(held_->grid, *grid_);
+  } else {
+    held_ = Held{.grid = *std::exchange(grid_, std::nullopt)};
+  }
+  held_->revision = revision_;
 }
 
 }  // namespace deform

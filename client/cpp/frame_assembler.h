@@ -2,38 +2,66 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/cpp/deform_stream.h"
 #include "core/frames/encoding.h"
+#include "core/frames/grid.h"
+#include "core/frames/point_order.h"
 #include "deform/v1/frame.pb.h"
 
 namespace deform {
 
-// Puts the chunks of one stream together. Not thread-safe.
+// Puts the chunks of one stream together. Holds the integers of two frames at
+// most, 12 bytes a point each, and the order of points, whatever comes. Not
+// thread-safe.
 class FrameAssembler {
  public:
-  // `encoding` is exact and borrowed for ever (FindEncoding).
-  FrameAssembler(const FrameEncoding& encoding, int dimension,
-                 int64_t point_count);
+  FrameAssembler(int dimension, int64_t point_count)
+      : dimension_(dimension), point_count_(point_count) {}
 
   // Adds a chunk to `frame`, the same for all chunks of a frame. True if it
   // completed it. Chunks come from outside: InvalidArgument (BAD_FRAME) if they
-  // do not follow each other, cover all points or decode. A frame of an epoch
-  // older than one seen is dropped.
+  // do not follow each other, cover all points, refer to what is held or
+  // decode. A frame of an epoch older than one seen is dropped.
   absl::StatusOr<bool> Add(const v1::FrameChunk& chunk, Frame& frame);
 
- private:
-  absl::Status Begin(const v1::FrameChunk& chunk, Frame& frame);
+  // A part of the order in which frames on a grid have their points.
+  // InvalidArgument BAD_POINT_ORDER.
+  absl::Status AddOrder(const v1::PointOrderChunk& chunk);
 
-  const FrameEncoding& encoding_;
+ private:
+  struct Held {
+    uint64_t revision = 0;
+    Grid grid;
+  };
+
+  absl::Status Begin(const v1::FrameChunk& chunk, Frame& frame);
+  absl::Status BeginOnGrid(const v1::FrameChunk& chunk);
+  absl::Status CheckFollows(const v1::FrameChunk& chunk) const;
+  absl::Status Decode(const v1::FrameChunk& chunk, Frame& frame);
+  void FinishOnGrid(Frame& frame);
+
   const int dimension_;
   const int64_t point_count_;
   uint64_t newest_epoch_ = 0;
-  int64_t next_vertex_ = 0;  // Vertices of the current frame so far.
-  uint64_t revision_ = 0;    // Of the current frame.
   bool have_origin_ = false;
   Vec3 origin_ = Vec3::Zero();
+  std::vector<uint8_t> order_bytes_;  // As far as they have come.
+  std::optional<PointOrder> order_;
+  std::optional<Held> held_;  // What the next frame on a grid may refer to.
+
+  // Of the current frame.
+  int64_t next_vertex_ = 0;  // Vertices so far.
+  uint64_t revision_ = 0;
+  const FrameEncoding* encoding_ = nullptr;
+  bool predicted_ = false;  // From what is held.
+  double step_ = 0;
+  std::optional<Grid> grid_;  // Kept for its memory.
 };
 
 }  // namespace deform

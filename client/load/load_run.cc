@@ -133,8 +133,7 @@ class Run {
     size_t next = 0;
     for (const auto& session : sessions_) {
       for (int p = 0; p < session->participants(); ++p) {
-        session->Start(clients_[next++ % clients_.size()], p, options_.delivery,
-                       options_.encodings);
+        session->Start(clients_[next++ % clients_.size()], p, options_.frames);
       }
     }
     const auto deadline = Clock::now() + kJoinPatience;

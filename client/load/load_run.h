@@ -29,8 +29,7 @@ struct LoadOptions {
   int editors = 1;   // Of each session.
   int viewers = 0;   // Likewise.
   double rate = 60;  // Poses a second of an editor.
-  Delivery delivery = Delivery::kLatest;
-  std::vector<std::string> encodings;  // Best first; empty: all there are.
+  DeformOptions frames;
   std::chrono::nanoseconds duration{std::chrono::seconds(10)};
   std::chrono::nanoseconds warm_up{std::chrono::seconds(1)};
   // Every session is looked at once in this time; 0: never.

@@ -15,9 +15,8 @@ class LoadSession::Participant final : public DeformEvents {
   Participant(LoadSession& session, int place, int editor)
       : session_(session), place_(place), editor_(editor) {}
 
-  void Start(Client& client, Delivery delivery,
-             const std::vector<std::string>& encodings) {
-    call_ = client.StartDeform(session_.id_, delivery, encodings, *this);
+  void Start(Client& client, const DeformOptions& options) {
+    call_ = client.StartDeform(session_.id_, options, *this);
   }
   void Stop() {
     {
@@ -53,10 +52,10 @@ class LoadSession::Participant final : public DeformEvents {
     session_.room_.changed();
   }
 
-  void OnFrame(const Frame& frame, int64_t bytes) override {
+  void OnFrame(const Frame& frame) override {
     const auto now = session_.room_.now();
     if (const auto* timing = session_.room_.timing.load()) {
-      timing->recorder->Arrived(now, bytes, frame.skipped_revisions,
+      timing->recorder->Arrived(now, frame.bytes, frame.skipped_revisions,
                                 frame.answers_sequence > told_,
                                 frame.deform_us);
       for (uint64_t s = told_ + 1; s <= frame.answers_sequence; ++s) {
@@ -153,9 +152,9 @@ LoadSession::~LoadSession() {
   for (const auto& participant : participants_) participant->Stop();
 }
 
-void LoadSession::Start(Client& client, int participant, Delivery delivery,
-                        const std::vector<std::string>& encodings) {
-  participants_[participant]->Start(client, delivery, encodings);
+void LoadSession::Start(Client& client, int participant,
+                        const DeformOptions& options) {
+  participants_[participant]->Start(client, options);
 }
 
 int LoadSession::joined() const {

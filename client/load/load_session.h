@@ -59,8 +59,7 @@ class LoadSession {
 
   // Participants join through `client`, in the order of their number; editors
   // come first.
-  void Start(Client& client, int participant, Delivery delivery,
-             const std::vector<std::string>& encodings);
+  void Start(Client& client, int participant, const DeformOptions& options);
   int participants() const { return static_cast<int>(participants_.size()); }
 
   const std::string& id() const { return id_; }

@@ -2,7 +2,7 @@
 #include "core/frames/encoding.h"
 
 // To add an encoding: write encodings/<name>.cc with a function
-// <Name>Encoding(), then add one line here.
+// <Name>Encoding(), then add one line here. The cheapest comes last.
 #define DEFORM_ENCODINGS(X) \
   X(Float32)                \
   X(Quantized16)            \

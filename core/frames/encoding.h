@@ -71,6 +71,9 @@ class FrameEncoding {
   // Gives back the very floats it was given: needs no tolerance.
   virtual bool is_exact() const { return false; }
   virtual bool uses_grid() const { return false; }
+  // The least tolerance that can be kept for points whose coordinates reach
+  // this far from the origin; 0 if it is exact.
+  virtual double FinestTolerance(double reach) const = 0;
 
   // Points that a chunk holds at most: then it never exceeds kMaxChunkBytes. On
   // a grid a multiple of kGridBlock, as is the beginning of every chunk.
@@ -90,6 +93,7 @@ class FrameEncoding {
                               const ChunkTarget& target) const = 0;
 };
 
+// From the one that takes most bytes to the cheapest.
 std::span<const FrameEncoding* const> AllEncodings();
 
 // Null if there is none of this name.

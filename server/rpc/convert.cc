@@ -5,16 +5,13 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
-#include "core/frames/encoding.h"
 #include "core/weights/compress_binding.h"
+#include "server/rpc/convert_parts.h"
 
 namespace deform::server {
 namespace {
-
-constexpr int kMaxEncodings = 16;
 
 using Doubles = google::protobuf::RepeatedField<double>;
 using Indices = google::protobuf::RepeatedField<uint32_t>;
@@ -175,24 +172,10 @@ absl::StatusOr<std::vector<int64_t>> ToClamped(
   return clamped;
 }
 
-absl::Status UnknownValue(absl::string_view field, int value) {
-  return InvalidInput("UNKNOWN_VALUE", field,
-                      absl::StrCat(field, " ", value, " is not known"));
-}
-
 void ToProto(absl::Time time, google::protobuf::Timestamp* out) {
   const int64_t nanos = absl::ToUnixNanos(time);
   out->set_seconds(nanos / 1'000'000'000);
   out->set_nanos(static_cast<int32_t>(nanos % 1'000'000'000));
-}
-
-template <typename Out>
-void AddRows(const PositionsRef& positions, int dimension, Out* out) {
-  out->Reserve(static_cast<int>(positions.rows()) * dimension);
-  for (int64_t i = 0; i < positions.rows(); ++i) {
-    for (int c = 0; c < dimension; ++c)
-      out->AddAlreadyReserved(positions(i, c));
-  }
 }
 
 }  // namespace
@@ -270,37 +253,6 @@ absl::StatusOr<PoseUpdate> FromProto(const v1::Pose& pose, int dimension) {
       ToPositions(pose.positions(), dimension, "pose.positions"));
   if (pose.has_stretch_blend()) update.stretch_blend = pose.stretch_blend();
   return update;
-}
-
-absl::StatusOr<JoinRequest> FromProto(const v1::Join& join) {
-  JoinRequest request;
-  DEFORM_ASSIGN_OR_RETURN(request.tenant, TenantOr(join.tenant()));
-  DEFORM_RETURN_IF_ERROR(CheckName(join.session_id(), "session_id"));
-  request.session_id = join.session_id();
-  if (!v1::Delivery_IsValid(join.delivery())) {
-    return UnknownValue("delivery", join.delivery());
-  }
-  if (join.delivery() == v1::DELIVERY_EVERY)
-    request.delivery = Delivery::kEvery;
-  if (join.encodings().empty()) request.encoding = FindEncoding("float32");
-  const int offered = std::min(join.encodings_size(), kMaxEncodings);
-  for (int i = 0; i < offered && request.encoding == nullptr; ++i) {
-    const FrameEncoding* const encoding = FindEncoding(join.encodings(i));
-    // Others need a tolerance, which is not negotiated yet.
-    if (encoding != nullptr && encoding->is_exact()) {
-      request.encoding = encoding;
-    }
-  }
-  if (request.encoding == nullptr) {
-    std::vector<absl::string_view> known;
-    for (const FrameEncoding* e : AllEncodings()) {
-      if (e->is_exact()) known.push_back(e->id());
-    }
-    return InvalidInput("UNKNOWN_ENCODING", "encodings",
-                        absl::StrCat("none of the encodings is known; known: ",
-                                     absl::StrJoin(known, ", ")));
-  }
-  return request;
 }
 
 void ToProto(const ModelRecord& record, v1::Model* model) {
@@ -426,33 +378,6 @@ void ToProto(const CoordinateScheme& scheme, v1::Scheme* out) {
   out->set_description(std::string(scheme.description()));
   out->set_takes_cage(scheme.rig_kind() == RigKind::kCage);
   out->set_uses_normals(scheme.uses_normals());
-}
-
-void ToProto(const Session::Joined& joined, const FrameEncoding& encoding,
-             v1::Joined* out) {
-  const BindingFacts& binding = joined.binding;
-  ToProto(joined.state, out->mutable_session());
-  out->set_encoding(std::string(encoding.id()));
-  out->set_dimension(binding.dimension());
-  out->set_point_count(binding.point_count());
-  const int64_t rows = PoseRows(binding.rig());
-  out->set_vertex_count(rows);
-  AddRows(joined.pose.vertices.topRows(rows), binding.dimension(),
-          out->mutable_pose());
-  out->set_stretch_blend(joined.pose.stretch_blend);
-}
-
-void ToProto(const RigChange& change, v1::RigChanged* out) {
-  const std::vector<int32_t>& previous = change.transfer.previous();
-  const Pose& pose = change.transfer.pose();
-  out->set_binding_id(change.binding_id);
-  out->set_revision(change.revision);
-  out->set_vertex_count(previous.size());
-  out->mutable_previous_vertices()->Add(previous.begin(), previous.end());
-  AddRows(pose.vertices.topRows(std::ssize(previous)), change.dimension,
-          out->mutable_pose());
-  out->set_stretch_blend(pose.stretch_blend);
-  out->set_largest_jump(change.largest_jump);
 }
 
 }  // namespace deform::server

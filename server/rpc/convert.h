@@ -58,7 +58,7 @@ struct JoinRequest {
   std::string tenant;
   std::string session_id;
   Delivery delivery = Delivery::kLatest;
-  const FrameEncoding* encoding = nullptr;  // The first that is known.
+  FrameWishes frames;  // Encodings are those that are known.
 };
 // BAD_NAME, UNKNOWN_VALUE (delivery), UNKNOWN_ENCODING.
 absl::StatusOr<JoinRequest> FromProto(const v1::Join& join);
@@ -72,8 +72,7 @@ void ToProto(const BindQuality& quality, v1::BindingQuality* out);
 void ToProto(const Rig& rig, v1::Rig* out);
 void ToProto(const SessionState& state, v1::Session* session);
 void ToProto(const CoordinateScheme& scheme, v1::Scheme* out);
-void ToProto(const Session::Joined& joined, const FrameEncoding& encoding,
-             v1::Joined* out);
+void ToProto(const Session::Joined& joined, v1::Joined* out);
 void ToProto(const RigChange& change, v1::RigChanged* out);
 
 }  // namespace deform::server

@@ -88,10 +88,13 @@ void DeformReactor::HandleMessage(const v1::DeformRequest& request) {
     HandleJoin(request.join());
   } else if (request.has_pose() && joined) {
     HandlePose(request.pose());
+  } else if (request.has_keyframe() && joined) {
+    participant()->WantKeyframe();
   } else {
     MutexLock lock(mutex_);
     End(joined ? InvalidInput("POSE_EXPECTED", "pose",
-                              "after joining, a stream has poses only")
+                              "after joining, a stream has poses and requests "
+                              "for keyframes")
                : InvalidInput("JOIN_FIRST", "join",
                               "the first message of a stream is join"));
   }
@@ -105,9 +108,9 @@ void DeformReactor::HandleJoin(const v1::Join& join) {
                                 request.tenant, request.session_id));
     DEFORM_ASSIGN_OR_RETURN(
         Session::Joined joined,
-        session->Join(request.delivery, *request.encoding, weak_from_this()));
+        session->Join(request.delivery, request.frames, weak_from_this()));
     v1::Joined message;
-    ToProto(joined, *request.encoding, &message);
+    ToProto(joined, &message);
     MutexLock lock(mutex_);
     joined_ = std::move(message);
     participant_ = std::move(joined.participant);
@@ -171,15 +174,20 @@ void DeformReactor::StartNextWrite() {
     Write(response);
     return;
   }
-  if (frame_) {
-    WriteChunk();
+  if (in_progress_) {
+    WriteNext();
     return;
   }
   std::optional<Outgoing> next = participant_->Take();
   if (!next) return;
   if (auto* frame = std::get_if<FrameToSend>(&*next)) {
-    frame_ = FrameInProgress{.send = std::move(*frame)};
-    WriteChunk();
+    const size_t chunks = frame->frame->chunks.size();
+    in_progress_ = InProgress{.what = std::move(*frame), .messages = chunks};
+    WriteNext();
+  } else if (auto* order = std::get_if<OrderToSend>(&*next)) {
+    const size_t messages = OrderMessages(*order->order);
+    in_progress_ = InProgress{.what = std::move(*order), .messages = messages};
+    WriteNext();
   } else if (auto* changed = std::get_if<RigChanged>(&*next)) {
     v1::DeformResponse response;
     ToProto(*changed->change, response.mutable_rig_changed());
@@ -195,16 +203,20 @@ void DeformReactor::StartNextWrite() {
   }
 }
 
-void DeformReactor::WriteChunk() {
-  const Session& session = participant_->session();
-  outgoing_ = FrameMessage(frame_->send, frame_->next_chunk++, session.epoch(),
-                           session.durable_revision());
-  const bool last = frame_->next_chunk == frame_->send.frame->chunks.size();
-  streams_.counters_.CountChunk(outgoing_.Length(), last);
-  if (last) {
-    frame_.reset();
-    ++frames_;
+void DeformReactor::WriteNext() {
+  const size_t part = in_progress_->next++;
+  const bool last = in_progress_->next == in_progress_->messages;
+  if (const auto* frame = std::get_if<FrameToSend>(&in_progress_->what)) {
+    const Session& session = participant_->session();
+    outgoing_ =
+        FrameMessage(*frame, part, session.epoch(), session.durable_revision());
+    streams_.counters_.CountChunk(outgoing_.Length(), last);
+    if (last) ++frames_;
+  } else {
+    outgoing_ =
+        OrderMessage(std::get<OrderToSend>(in_progress_->what).order, part);
   }
+  if (last) in_progress_.reset();
   writing_ = true;
   StartWrite(&outgoing_);
 }

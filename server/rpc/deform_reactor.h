@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <variant>
 
 #include "absl/status/status.h"
 #include "core/base/mutex.h"
@@ -77,9 +78,10 @@ class DeformReactor final
   using TimePoint = std::chrono::steady_clock::time_point;
 
   // What is being written, if it takes more than one message.
-  struct FrameInProgress {
-    FrameToSend send;
-    size_t next_chunk = 0;
+  struct InProgress {
+    std::variant<FrameToSend, OrderToSend> what;
+    size_t messages = 0;
+    size_t next = 0;
   };
 
   void HandleMessage(const v1::DeformRequest& request);
@@ -92,7 +94,8 @@ class DeformReactor final
   void StartNextWrite() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Write(const v1::DeformResponse& response)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void WriteChunk() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Of what is in progress.
+  void WriteNext() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Ends the stream with `status`, told in-band too if nothing is being
   // written.
   void End(const absl::Status& status) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -108,7 +111,7 @@ class DeformReactor final
   // Set once, by joining.
   std::unique_ptr<Participant> participant_ ABSL_GUARDED_BY(mutex_);
   std::optional<v1::Joined> joined_ ABSL_GUARDED_BY(mutex_);  // To be told.
-  std::optional<FrameInProgress> frame_ ABSL_GUARDED_BY(mutex_);
+  std::optional<InProgress> in_progress_ ABSL_GUARDED_BY(mutex_);
   bool reading_ ABSL_GUARDED_BY(mutex_) = false;
   bool writing_ ABSL_GUARDED_BY(mutex_) = false;
   bool half_closed_ ABSL_GUARDED_BY(mutex_) = false;

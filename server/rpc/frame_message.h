@@ -17,4 +17,9 @@ namespace deform::server {
 grpc::ByteBuffer FrameMessage(const FrameToSend& send, size_t chunk,
                               uint64_t epoch, uint64_t durable_revision);
 
+// DeformResponse{point_order}, likewise: message `part` of OrderMessages().
+size_t OrderMessages(const PointOrder& order);
+grpc::ByteBuffer OrderMessage(const std::shared_ptr<const PointOrder>& order,
+                              size_t part);
+
 }  // namespace deform::server

@@ -1,14 +1,26 @@
 #include "server/sessions/audience.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 namespace deform::server {
 
-int64_t Audience::Add(Delivery delivery, const FrameEncoding& encoding,
+bool Audience::Seat::CanBeServed() const {
+  if (outbox.delivery() == Delivery::kEvery) return !outbox.full();
+  if (!format.encoding->uses_grid()) return true;
+  return !waiting_since && !outbox.has_frames();
+}
+
+bool Audience::Seat::MustSeeThis() const {
+  return needs_frame && CanBeServed() &&
+         (!offered_any || outbox.delivery() == Delivery::kEvery);
+}
+
+int64_t Audience::Add(Delivery delivery, const FrameFormat& format,
                       std::weak_ptr<Receiver> receiver) {
   Seat seat{.outbox = Outbox(delivery),
-            .encoding = &encoding,
+            .format = format,
             .receiver = std::move(receiver)};
   Serve(seat);
   const int64_t number = next_seat_++;
@@ -19,6 +31,13 @@ int64_t Audience::Add(Delivery delivery, const FrameEncoding& encoding,
 Outbox* Audience::Find(int64_t seat) {
   const auto found = seats_.find(seat);
   return found == seats_.end() ? nullptr : &found->second.outbox;
+}
+
+void Audience::WantKeyframe(int64_t seat) {
+  const auto found = seats_.find(seat);
+  if (found == seats_.end()) return;
+  found->second.held.reset();
+  found->second.needs_frame = true;
 }
 
 bool Audience::HasRoom() const {
@@ -35,20 +54,25 @@ bool Audience::HasRoomForRigChange() const {
 }
 
 bool Audience::NeedsFrame() const {
-  return std::any_of(seats_.begin(), seats_.end(),
-                     [](const auto& seat) { return seat.second.needs_frame; });
+  return std::any_of(seats_.begin(), seats_.end(), [](const auto& seat) {
+    return seat.second.needs_frame && seat.second.CanBeServed();
+  });
 }
 
-std::vector<const FrameEncoding*> Audience::Wanted(bool by_all) const {
-  std::vector<const FrameEncoding*> wanted;
+bool Audience::MustSeeThis() const {
+  return std::any_of(seats_.begin(), seats_.end(), [](const auto& seat) {
+    return seat.second.MustSeeThis();
+  });
+}
+
+std::vector<FrameKey> Audience::Wanted(bool by_all) const {
+  std::set<FrameKey> wanted;
   for (const auto& [number, seat] : seats_) {
-    if ((by_all || seat.needs_frame) &&
-        std::find(wanted.begin(), wanted.end(), seat.encoding) ==
-            wanted.end()) {
-      wanted.push_back(seat.encoding);
+    if ((by_all || seat.needs_frame) && seat.CanBeServed()) {
+      wanted.insert(seat.key());
     }
   }
-  return wanted;
+  return {wanted.begin(), wanted.end()};
 }
 
 void Audience::Contain(int64_t seat, uint64_t sequence) {
@@ -66,15 +90,20 @@ void Audience::Publish(uint64_t revision, Frames frames) {
   revision_ = revision;
   frames_.merge(frames);
   for (auto& [number, seat] : seats_) {
-    if (newer || seat.needs_frame) Serve(seat);
+    if (newer) seat.needs_frame = true;
+    if (seat.needs_frame && seat.CanBeServed()) Serve(seat);
   }
 }
 
 void Audience::Serve(Seat& seat) {
-  const auto frame = frames_.find(seat.encoding);
-  // Who joined while frames were encoded may want one that was not in use.
-  seat.needs_frame = frame == frames_.end();
-  if (!seat.needs_frame) seat.outbox.Offer(frame->second, seat.contained);
+  const auto found = frames_.find(seat.key());
+  // Who joined while frames were made may want one that nobody asked for.
+  if (found == frames_.end()) return;
+  const std::shared_ptr<const Frame>& frame = found->second;
+  seat.outbox.Offer(frame, seat.contained);
+  if (frame->grid != nullptr) seat.held = frame->grid;
+  seat.needs_frame = false;
+  seat.offered_any = true;
 }
 
 void Audience::EndNow(const absl::Status& status) {

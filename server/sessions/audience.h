@@ -1,5 +1,5 @@
 // Those who receive a session's frames: who sits there, what waits for each,
-// and the frames of the present revision.
+// what each holds, and the frames of the present revision.
 #pragma once
 
 #include <chrono>
@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "core/frames/encoding.h"
 #include "server/sessions/frame.h"
+#include "server/sessions/frame_maker.h"
 #include "server/sessions/outbox.h"
 #include "server/sessions/rig_change.h"
 
@@ -26,30 +26,39 @@ class Receiver {
   virtual void Wake() = 0;
 };
 
+// A receiver holds one revision on a grid: the last that it was offered, since
+// streams lose nothing. So a frame that refers to another may not be replaced
+// in the outbox: with delivery LATEST such a seat is offered one only when
+// nothing is under way to it, and is served late otherwise. Others are always
+// offered the newest, in which they share.
+//
 // Not thread-safe. A seat that is not there (any more) takes nothing in.
 class Audience {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;
   using Receivers = std::vector<std::weak_ptr<Receiver>>;
-  using Frames = std::map<const FrameEncoding*, std::shared_ptr<const Frame>>;
 
   // Gives a seat, which gets a frame of the present revision: at once if there
   // is one, else it needs one.
-  int64_t Add(Delivery delivery, const FrameEncoding& encoding,
+  int64_t Add(Delivery delivery, const FrameFormat& format,
               std::weak_ptr<Receiver> receiver);
   void Remove(int64_t seat) { seats_.erase(seat); }
   int size() const { return static_cast<int>(seats_.size()); }
   // Null if there is none. Its frames come by Publish() and go by Take().
   Outbox* Find(int64_t seat);
+  // The seat has lost what it held: it needs a frame that refers to no other.
+  void WantKeyframe(int64_t seat);
 
   // Everybody has room for the frame of a next revision.
   bool HasRoom() const;
   // And for a change of the rig before it.
   bool HasRoomForRigChange() const;
-  // Somebody has no frame of the present revision to come.
+  // Somebody who can be served lacks a frame of the present revision.
   bool NeedsFrame() const;
-  // The encodings in use: by those who need a frame, or by all.
-  std::vector<const FrameEncoding*> Wanted(bool by_all) const;
+  // And must see this one: a next revision would come too early.
+  bool MustSeeThis() const;
+  // The frames to be made for those who can be served: who lack one, or all.
+  std::vector<FrameKey> Wanted(bool by_all) const;
 
   // The revision that is published next contains this pose of the seat's.
   void Contain(int64_t seat, uint64_t sequence);
@@ -57,7 +66,7 @@ class Audience {
   // HasRoomForRigChange().
   void Announce(const std::shared_ptr<const RigChange>& change);
   // Frames of the present revision, or of the next, for which there is room.
-  // Everybody gets one of it, as far as it is there; others need one.
+  // Who can be served gets his, as far as it is there; others lack one.
   void Publish(uint64_t revision, Frames frames);
 
   // See Outbox.
@@ -76,14 +85,20 @@ class Audience {
  private:
   struct Seat {
     Outbox outbox;
-    const FrameEncoding* encoding = nullptr;
+    FrameFormat format;
     std::weak_ptr<Receiver> receiver;
     uint64_t contained = 0;  // Newest pose that the revision contains.
-    bool needs_frame = false;
+    bool needs_frame = true;
+    bool offered_any = false;
+    std::shared_ptr<const RevisionGrid> held;
     std::optional<TimePoint> waiting_since;
+
+    FrameKey key() const { return {format, held}; }
+    bool CanBeServed() const;
+    bool MustSeeThis() const;
   };
 
-  // Gives the seat its frame of the present revision.
+  // Gives the seat its frame of the present revision, if it is there.
   void Serve(Seat& seat);
 
   std::map<int64_t, Seat> seats_;

@@ -67,6 +67,10 @@ std::optional<Outgoing> Outbox::Take() {
     changes.pop_front();
     return changed;
   }
+  if (const auto& order = frames_.front().frame->order;
+      order != nullptr && !std::exchange(sent_order_, true)) {
+    return OrderToSend{order};
+  }
   return TakeFrame();
 }
 
@@ -75,8 +79,11 @@ FrameToSend Outbox::TakeFrame() {
   frames_.pop_front();
   const FrameInfo& info = waiting.frame->info;
   FrameToSend send{.frame = waiting.frame, .answers_sequence = waiting.answers};
-  if (sent_any_) send.skipped_revisions = info.revision - revision_ - 1;
-  send.keyframe = !sent_any_ || info.origin_number != origin_number_;
+  // The same revision comes again to who asked for a keyframe.
+  if (sent_any_ && info.revision > revision_) {
+    send.skipped_revisions = info.revision - revision_ - 1;
+  }
+  send.tells_origin = !sent_any_ || info.origin_number != origin_number_;
   sent_any_ = true;
   answered_ = waiting.answers;
   revision_ = info.revision;

@@ -27,7 +27,11 @@ struct FrameToSend {
   std::shared_ptr<const Frame> frame;
   uint64_t answers_sequence = 0;
   uint64_t skipped_revisions = 0;
-  bool keyframe = false;
+  bool tells_origin = false;
+};
+// Comes before the first frame on a grid.
+struct OrderToSend {
+  std::shared_ptr<const PointOrder> order;
 };
 // Comes before the first frame on the new rig.
 struct RigChanged {
@@ -41,7 +45,8 @@ struct Rejection {
 struct Ended {
   absl::Status status;
 };
-using Outgoing = std::variant<FrameToSend, RigChanged, Rejection, Ended>;
+using Outgoing =
+    std::variant<FrameToSend, OrderToSend, RigChanged, Rejection, Ended>;
 
 // Not thread-safe; never holds more than a few frames and rejections.
 class Outbox {
@@ -59,6 +64,7 @@ class Outbox {
   void Offer(std::shared_ptr<const Frame> frame, uint64_t answers);
   // The next frame must wait until one is taken. Only with kEvery.
   bool full() const;
+  bool has_frames() const { return !frames_.empty(); }
 
   // Frames that are offered from now on are of the changed rig. Needs room for
   // rig changes.
@@ -106,6 +112,7 @@ class Outbox {
   uint64_t revision_ = 0;
   uint64_t origin_number_ = 0;
   bool sent_any_ = false;
+  bool sent_order_ = false;
 };
 
 }  // namespace deform::server

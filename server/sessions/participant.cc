@@ -39,6 +39,12 @@ bool Participant::WantsPoses() const {
           session_->queue_.OwnStepsOf(seat_) < Session::kMaxOwnSteps);
 }
 
+void Participant::WantKeyframe() {
+  MutexLock lock(session_->mutex_);
+  session_->audience_.WantKeyframe(seat_);
+  session_->Schedule();
+}
+
 void Participant::HalfClose() {
   MutexLock lock(session_->mutex_);
   Outbox* const outbox = session_->audience_.Find(seat_);

@@ -35,6 +35,8 @@ class Participant {
   // False while as many of its poses or rejections wait as may. The receiver
   // is woken when that changes.
   bool WantsPoses() const;
+  // What it held is lost: the next frame is to refer to no other.
+  void WantKeyframe();
   // No more poses come; the stream ends OK once those that came are answered.
   void HalfClose();
 

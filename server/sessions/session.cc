@@ -42,6 +42,7 @@ Session::Session(StoredStart start, BindingInUse use,
       dimension_(use.lease.record()->facts.dimension()),
       create_time_(start.create_time),
       environment_(environment),
+      frame_maker_(environment.point_orders),
       memory_(std::move(memory)),
       lease_(std::move(use.lease)),
       binding_id_(lease_.record()->id),
@@ -62,9 +63,10 @@ Session::Session(StoredStart start, BindingInUse use,
 
 int64_t Session::BytesFor(const BindingFacts& binding) {
   const int64_t columns = binding.column_count();
-  // Displacements of double, two frames of float, columns and a few poses.
+  // Displacements of double, two frames of float, two grids, columns and a few
+  // poses.
   return binding.point_count() * 3 *
-             int64_t{sizeof(double) + 2 * sizeof(float)} +
+             int64_t{sizeof(double) + 2 * sizeof(float) + 2 * sizeof(int32_t)} +
          6 * columns * 3 * int64_t{sizeof(double)};
 }
 
@@ -90,7 +92,7 @@ SessionState Session::StateLocked() const {
 }
 
 absl::StatusOr<Session::Joined> Session::Join(
-    Delivery delivery, const FrameEncoding& encoding,
+    Delivery delivery, const FrameWishes& wishes,
     std::weak_ptr<Receiver> receiver) {
   MutexLock lock(mutex_);
   if (closed_) return *closed_;
@@ -101,12 +103,14 @@ absl::StatusOr<Session::Joined> Session::Join(
                      " participants, its limit (max-participants)"),
         {.reason = "TOO_MANY_PARTICIPANTS", .field = "max-participants"});
   }
-  const int64_t seat = audience_.Add(delivery, encoding, std::move(receiver));
+  DEFORM_ASSIGN_OR_RETURN(const FrameFormat format,
+                          PickFormat(wishes, facts().rig()));
+  const int64_t seat = audience_.Add(delivery, format, std::move(receiver));
   senders_[seat] = {.first_change = rig_history_.count()};
   Schedule();
   return Joined{
       std::unique_ptr<Participant>(new Participant(shared_from_this(), seat)),
-      StateLocked(), facts(), pose_};
+      format, StateLocked(), facts(), pose_};
 }
 
 void Session::Move(RigMove move) {
@@ -191,7 +195,7 @@ Session::Step Session::BeginStep() {
   MutexLock lock(mutex_);
   step.binding_id = binding_id_;
   // Who has joined sees the state as it was before anything newer.
-  if (!audience_.NeedsFrame()) {
+  if (!audience_.MustSeeThis()) {
     if (refreshed_ != nullptr) {
       step.refreshed = std::move(refreshed_);
     } else if (CanMove()) {
@@ -201,7 +205,7 @@ Session::Step Session::BeginStep() {
       step.pose = queue_.Pop();
     }
   }
-  step.encodings = audience_.Wanted(step.move || step.pose);
+  step.wanted = audience_.Wanted(step.move || step.pose);
   return step;
 }
 
@@ -210,11 +214,7 @@ void Session::FinishStep(Step step, ThreadPool* pool) {
   if (step.move) moved = ChangeRig(step, pool);
   if (step.refreshed != nullptr) ChangeForm(step, pool);
   if (step.pose) Describe(step.pose->pose, step.report, step.deform_time);
-  Audience::Frames frames;
-  for (const FrameEncoding* encoding : step.encodings) {
-    frames[encoding] = EncodeFrame(*deformer_, *encoding, info_, pool);
-  }
-  Wake(Publish(step, std::move(frames)));
+  Wake(Publish(step, frame_maker_.Make(*deformer_, info_, step.wanted, pool)));
   EndIfLost();
   if (!step.move) return;
   // The binding before is let go before anyone learns of it.
@@ -233,6 +233,7 @@ void Session::Describe(const Pose& pose, const DeformReport& report,
   info_.deform_time = time;
   info_.columns_applied = report.columns_applied;
   info_.exit_mismatch = report.exit_mismatch;
+  info_.weight_error = report.error_bound;
   ++info_.revision;
   const Vec3 center = BoxOf(pose.vertices).center();
   const double far = kOriginStep * DiagonalOf(deformer_->binding().rig());
@@ -284,12 +285,14 @@ void Session::ChangeForm(Step& step, ThreadPool* pool) {
   DeformJob job{.deformer = next.get(), .pose = &pose};
   MoveTogether({&job, 1}, pool);
   deformer_ = std::move(next);
+  // The revision's frames may come from either form.
+  info_.weight_error = std::max(info_.weight_error, job.report.error_bound);
   // The former weights go with the step, not under the lock.
   MutexLock lock(mutex_);
   weights_.swap(step.refreshed);
 }
 
-Session::Receivers Session::Publish(Step& step, Audience::Frames frames) {
+Session::Receivers Session::Publish(Step& step, Frames frames) {
   MutexLock lock(mutex_);
   Pose before;
   if (step.change != nullptr) PublishChange(step);

@@ -19,13 +19,15 @@
 #include "core/base/mutex.h"
 #include "core/base/thread_pool.h"
 #include "core/deform/deformer.h"
-#include "core/frames/encoding.h"
 #include "server/models/binding_registry.h"
 #include "server/sessions/audience.h"
 #include "server/sessions/batch_scheduler.h"
 #include "server/sessions/frame.h"
+#include "server/sessions/frame_maker.h"
+#include "server/sessions/frame_wishes.h"
 #include "server/sessions/outbox.h"
 #include "server/sessions/participant.h"
+#include "server/sessions/point_orders.h"
 #include "server/sessions/pose_queue.h"
 #include "server/sessions/rig_change.h"
 #include "server/sessions/rig_history.h"
@@ -46,6 +48,7 @@ struct SessionEnvironment {
   int max_participants = 64;
   // How long a receiver may take to send one message.
   std::chrono::milliseconds stall_timeout{10000};
+  std::shared_ptr<PointOrders> point_orders = std::make_shared<PointOrders>();
   JournalReport report = {};  // May be empty.
   // What the manager adds. The store of all sessions; null: they are not kept.
   Store* store = nullptr;
@@ -74,10 +77,10 @@ struct StoredStart {
 };
 
 // Poses merge into a queue of steps; a step is run by the scheduler, one at a
-// time: the deformer moves, the revision rises, the frame is encoded once per
-// encoding in use and offered to every participant. The store is told of every
-// revision, and nobody waits for it. Thread-safe; the lock is never held while
-// deforming or encoding.
+// time: the deformer moves, the revision rises, its frames are encoded, each
+// once for all who receive the same bytes, and offered to every participant.
+// The store is told of every revision, and nobody waits for it. Thread-safe;
+// the lock is never held while deforming or encoding.
 class Session : public std::enable_shared_from_this<Session> {
  public:
   // A participant's poses that may wait with Delivery::kEvery.
@@ -111,13 +114,15 @@ class Session : public std::enable_shared_from_this<Session> {
 
   struct Joined {
     std::unique_ptr<Participant> participant;
+    FrameFormat format;
     SessionState state;
     BindingFacts binding;
     Pose pose;
   };
   // A frame of the present state follows. ResourceExhausted
-  // TOO_MANY_PARTICIPANTS; after End() or Drain() their status.
-  absl::StatusOr<Joined> Join(Delivery delivery, const FrameEncoding& encoding,
+  // TOO_MANY_PARTICIPANTS; what PickFormat() refuses; after End() or Drain()
+  // their status.
+  absl::StatusOr<Joined> Join(Delivery delivery, const FrameWishes& wishes,
                               std::weak_ptr<Receiver> receiver);
 
   // Moves to the binding of edited handles, as a revision of its own, before
@@ -152,7 +157,7 @@ class Session : public std::enable_shared_from_this<Session> {
     std::shared_ptr<const Binding> refreshed;
     std::shared_ptr<const RigChange> change;  // What the move made.
     std::string binding_id;                   // Before it.
-    std::vector<const FrameEncoding*> encodings;
+    std::vector<FrameKey> wanted;             // Frames to be made.
     Deformer* deformer = nullptr;
     // Once the deformer has moved to the pose.
     DeformReport report;
@@ -200,7 +205,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void ChangeForm(Step& step, ThreadPool* pool);
   void Describe(const Pose& pose, const DeformReport& report,
                 std::chrono::microseconds time);
-  Receivers Publish(Step& step, Audience::Frames frames);
+  Receivers Publish(Step& step, Frames frames);
   void PublishChange(Step& step) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Tells the store of the revision that `before` went to.
   void Journal(const Step& step, const Pose& before)
@@ -218,6 +223,7 @@ class Session : public std::enable_shared_from_this<Session> {
   // the scheduler hands them from one to the next.
   std::unique_ptr<Deformer> deformer_;
   FrameInfo info_;
+  FrameMaker frame_maker_;
 
   mutable Mutex mutex_;
   MemoryBudget::Reservation memory_ ABSL_GUARDED_BY(mutex_);

@@ -45,6 +45,7 @@ void Session::WakeUp(FindWeights find_weights) {
     DeformJob job{.deformer = deformer.get(), .pose = &pose};
     MoveTogether({&job, 1}, nullptr);
     deformer_ = std::move(deformer);
+    info_.weight_error = job.report.error_bound;
   }
   Receivers receivers;
   std::deque<RigMove> moves;

@@ -30,8 +30,7 @@ class Player : public Receiver {
  public:
   void Join(const std::shared_ptr<Session>& session,
             const std::shared_ptr<Player>& self) {
-    auto joined =
-        session->Join(Delivery::kLatest, *FindEncoding("float32"), self);
+    auto joined = session->Join(Delivery::kLatest, server::FrameWishes{}, self);
     MutexLock lock(mutex_);
     pose_ = {.positions = joined->pose.vertices};
     participant_ = std::move(joined->participant);

@@ -297,9 +297,9 @@ class Events : public DeformEvents {
     points = joined.point_count;
     Happened();
   }
-  void OnFrame(const Frame& frame, int64_t bytes) override {
+  void OnFrame(const Frame& frame) override {
     answered = frame.answers_sequence;
-    frame_bytes = bytes;
+    frame_bytes = frame.bytes;
     Happened();
   }
   void OnRejected(uint64_t sequence, const absl::Status& status) override {
@@ -336,8 +336,8 @@ class Events : public DeformEvents {
 TEST(DeformCall, SendsPosesAndTellsFramesWithoutAThreadThatWaits) {
   RunningServer server;
   Events events;
-  const auto call = server.client().StartDeform(server.BallSession(),
-                                                Delivery::kEvery, {}, events);
+  const auto call = server.client().StartDeform(
+      server.BallSession(), {.delivery = Delivery::kEvery}, events);
   events.Await([&] { return events.points == 162; });
   const PoseUpdate right = {.vertices = {0}, .positions = Positions(1, 3)};
   EXPECT_TRUE(call->Send(right));
@@ -357,8 +357,7 @@ TEST(DeformCall, SendsPosesAndTellsFramesWithoutAThreadThatWaits) {
 TEST(DeformCall, TellsWhyItCouldNotJoin) {
   RunningServer server;
   Events events;
-  const auto call =
-      server.client().StartDeform("nowhere", Delivery::kLatest, {}, events);
+  const auto call = server.client().StartDeform("nowhere", {}, events);
   events.Await([&] { return events.ended.load(); });
   EXPECT_TRUE(absl::IsNotFound(events.end)) << events.end;
 }
@@ -366,8 +365,7 @@ TEST(DeformCall, TellsWhyItCouldNotJoin) {
 TEST(DeformCall, EndsWhenItIsDestroyed) {
   RunningServer server;
   Events events;
-  auto call = server.client().StartDeform(server.BallSession(),
-                                          Delivery::kLatest, {}, events);
+  auto call = server.client().StartDeform(server.BallSession(), {}, events);
   call.reset();
   EXPECT_TRUE(events.ended);
   EXPECT_TRUE(absl::IsCancelled(events.end)) << events.end;

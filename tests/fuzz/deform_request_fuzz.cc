@@ -45,7 +45,10 @@ void CheckPose(const v1::Pose& message, const Rig& rig) {
 void CheckJoin(const v1::Join& message) {
   const auto join = FromProto(message);
   if (!join.ok()) return CheckRefusal(join.status());
-  FUZZ_EXPECT(join->encoding != nullptr);
+  const auto format = PickFormat(join->frames, CubeRig());
+  if (!format.ok()) return CheckRefusal(format.status());
+  FUZZ_EXPECT(format->encoding != nullptr);
+  FUZZ_EXPECT(format->encoding->is_exact() == (format->tolerance == 0));
   FUZZ_EXPECT(!join->tenant.empty() && !join->session_id.empty());
 }
 

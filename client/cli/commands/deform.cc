@@ -7,6 +7,7 @@
 #include "client/cli/command.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/files.h"
+#include "client/cli/frame_options.h"
 #include "client/cli/motion.h"
 #include "client/cli/picture_options.h"
 #include "client/cli/stage.h"
@@ -21,6 +22,7 @@ struct Options {
   std::string motion;
   double at = 0.25;
   double blend = 1;
+  FrameOptions frames;
   std::string out;
   std::string png;
   PictureOptions picture;
@@ -58,7 +60,10 @@ void Tell(const Options& options, const Stage& stage, const Frame& frame,
                      {"clamped_count", binding.clamped_count},
                      {"compute_seconds", binding.compute_seconds},
                      {"deform_us", frame.deform_us},
-                     {"exit_mismatch", frame.exit_mismatch}};
+                     {"exit_mismatch", frame.exit_mismatch},
+                     {"encoding", frame.encoding},
+                     {"bytes", frame.bytes},
+                     {"error_bound", frame.error_bound}};
   console.Result(json, [&](std::ostream& out) {
     out << absl::StrFormat(
         "%s points deformed in %s (weights: %s%s)\n",
@@ -90,12 +95,15 @@ absl::Status Run(const Options& options, Context& context) {
     return UsageError(
         "give the posed rig, --pose FILE, or a built-in --motion");
   }
+  DEFORM_ASSIGN_OR_RETURN(const DeformOptions frames,
+                          options.frames.For(Delivery::kEvery));
   DEFORM_ASSIGN_OR_RETURN(const std::unique_ptr<Stage> stage,
                           Stage::Open(context, options.stage));
   DEFORM_ASSIGN_OR_RETURN(const Positions pose, PoseOf(options, *stage));
   DEFORM_ASSIGN_OR_RETURN(
       const Frame frame,
-      stage->DeformOnce({.positions = pose, .stretch_blend = options.blend}));
+      stage->DeformOnce({.positions = pose, .stretch_blend = options.blend},
+                        frames));
   const Positions deformed = frame.DoublePositions();
   if (!options.out.empty()) {
     DEFORM_ASSIGN_OR_RETURN(const std::string bytes,
@@ -130,6 +138,7 @@ Action Setup(CLI::App& app) {
       ->type_name("FILE");
   app.add_option("--png", options->png, "Picture of rest and posed state")
       ->type_name("FILE");
+  options->frames.AddTo(app);
   options->stage.AddTo(app);
   options->picture.AddTo(app);
   return [options](Context& context) { return Run(*options, context); };

@@ -11,6 +11,7 @@
 #include "client/cli/command.h"
 #include "client/cli/duration.h"
 #include "client/cli/exit_code.h"
+#include "client/cli/frame_options.h"
 #include "client/cli/load_picture.h"
 #include "client/cli/load_stage.h"
 #include "client/cli/load_text.h"
@@ -19,7 +20,6 @@
 #include "client/pictures/image.h"
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
-#include "core/frames/encoding.h"
 
 namespace deform::cli {
 namespace {
@@ -36,6 +36,7 @@ constexpr std::chrono::seconds kCallTimeout{10};
 struct Options {
   LoadStageOptions stage;
   LoadOptions load;
+  FrameOptions frames;
   std::string delivery = "latest";
   std::string duration = "10s";
   std::string warm_up = "1s";
@@ -49,24 +50,6 @@ struct Options {
 
   std::chrono::nanoseconds p99_limit{0};
 };
-
-// Others need a tolerance, which is not negotiated yet.
-absl::Status CheckEncodings(const std::vector<std::string>& encodings) {
-  std::vector<absl::string_view> known;
-  for (const FrameEncoding* encoding : AllEncodings()) {
-    if (encoding->is_exact()) known.push_back(encoding->id());
-  }
-  for (const std::string& encoding : encodings) {
-    if (std::find(known.begin(), known.end(),
-                  absl::string_view(encoding.data(), encoding.size())) !=
-        known.end()) {
-      continue;
-    }
-    return UsageError(absl::StrCat("--encoding: there is no '", encoding,
-                                   "', only ", absl::StrJoin(known, ", ")));
-  }
-  return absl::OkStatus();
-}
 
 // What the options mean together.
 absl::Status Complete(Options& options) {
@@ -84,8 +67,11 @@ absl::Status Complete(Options& options) {
   } else if (options.find_limit) {
     return UsageError("--find-limit needs the limit, such as --p99 5ms");
   }
-  load.delivery =
-      options.delivery == "every" ? Delivery::kEvery : Delivery::kLatest;
+  DEFORM_ASSIGN_OR_RETURN(
+      load.frames,
+      options.frames.For(options.delivery == "every" ? Delivery::kEvery
+                                                     : Delivery::kLatest));
+  options.stage.frame_tolerance = options.frames.tolerance;
   options.stage.check = load.check_interval.count() > 0;
   options.stage.editors = load.editors;
   options.stage.rate = load.rate;
@@ -99,7 +85,7 @@ absl::Status Complete(Options& options) {
         "these are ", Thousands(load.sessions * each), " participants; ",
         Thousands(kMaxParticipants), " are the most that one client plays"));
   }
-  return CheckEncodings(load.encodings);
+  return absl::OkStatus();
 }
 
 int64_t Connections(const Options& options, int64_t sessions) {
@@ -324,7 +310,7 @@ void AddModelOptions(CLI::App& app, LoadStageOptions& stage) {
       ->type_name("FILE");
   app.add_option("--tolerance", stage.tolerance,
                  "What a position may be off, as a part of the rig's diagonal, "
-                 "beside the tolerance of compressed weights")
+                 "beside the tolerances of compressed weights and of frames")
       ->check(CLI::Range(1e-9, 1.0))
       ->capture_default_str();
 }
@@ -357,10 +343,7 @@ void AddLoadOptions(CLI::App& app, Options& options) {
                  "for each pose")
       ->check(CLI::IsMember({"latest", "every"}))
       ->capture_default_str();
-  app.add_option("--encoding", load.encodings,
-                 "Frame encodings to accept, best first; without it all")
-      ->delimiter(',')
-      ->type_name("NAME");
+  options.frames.AddTo(app);
   app.add_option("--connections", options.connections,
                  "Connections that the participants share; 0: one for 16")
       ->check(CLI::Range(int64_t{0}, kMaxConnections))
@@ -406,6 +389,7 @@ const Command& LoadCommand() {
       "deformctl load --sessions 100 --rate 60 --duration 20s\n"
       "deformctl load --sessions 4 --points 173000 --pattern whole --png "
       "l.png\n"
+      "deformctl load --sessions 4 --points 173000 --frame-tolerance 1e-5\n"
       "deformctl load --sessions 1 --editors 8 --viewers 32 --json\n"
       "deformctl load --binding $binding --poses poses/ --delivery every\n"
       "deformctl load --find-limit --p99 5ms --duration 5s",

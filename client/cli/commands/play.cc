@@ -8,6 +8,7 @@
 #include "client/cli/command.h"
 #include "client/cli/exit_code.h"
 #include "client/cli/files.h"
+#include "client/cli/frame_options.h"
 #include "client/cli/motion.h"
 #include "client/cli/player.h"
 #include "client/cli/progress.h"
@@ -27,6 +28,7 @@ struct Options {
   int in_flight = 4;
   double rate = 0;
   double blend = 1;
+  FrameOptions format;
   std::string out_dir;
 };
 
@@ -104,6 +106,7 @@ void Tell(const Options& options, const Stage& stage, const PlayReport& report,
   const double deform_ms =
       1e-3 * static_cast<double>(report.deform_us) / frames;
   const double columns = static_cast<double>(report.columns_applied) / frames;
+  const double bytes_per_frame = static_cast<double>(report.bytes) / frames;
   const Json json = {{"point_count", stage.binding().point_count},
                      {"poses", report.poses_sent},
                      {"frames", report.frames},
@@ -115,15 +118,19 @@ void Tell(const Options& options, const Stage& stage, const PlayReport& report,
                        {"p99", report.LatencyMs(0.99)},
                        {"max", report.LatencyMs(1)}}},
                      {"bytes", report.bytes},
+                     {"bytes_per_frame", bytes_per_frame},
+                     {"encodings", report.encodings},
                      {"deform_ms", deform_ms},
                      {"columns_applied", columns},
                      {"exit_mismatch_max", report.exit_mismatch_max},
                      {"out_dir", options.out_dir}};
   console.Result(json, [&](std::ostream& out) {
     out << absl::StrFormat(
-        "%s poses, %s frames of %s points in %s: %.1f frames/s, %s/s\n",
+        "%s poses, %s frames of %s points in %s: %.1f frames/s, %s each, "
+        "%s/s\n",
         Thousands(report.poses_sent), Thousands(report.frames),
         Thousands(stage.binding().point_count), Seconds(report.seconds), rate,
+        Bytes(static_cast<int64_t>(bytes_per_frame)),
         Bytes(
             static_cast<int64_t>(static_cast<double>(report.bytes) / seconds)));
     out << absl::StrFormat(
@@ -133,6 +140,9 @@ void Tell(const Options& options, const Stage& stage, const PlayReport& report,
         "server: %.2f ms deforming a frame, %.0f of %d columns applied\n",
         deform_ms, columns,
         stage.binding().vertex_count + stage.binding().normal_count);
+    for (const auto& [encoding, count] : report.encodings) {
+      out << Thousands(count) << " frames came as " << encoding << "\n";
+    }
     if (report.skipped_revisions > 0) {
       out << Thousands(static_cast<int64_t>(report.skipped_revisions))
           << " revisions skipped\n";
@@ -145,6 +155,10 @@ absl::Status Run(const Options& options, Context& context) {
   if (options.poses.empty() == options.motion.empty()) {
     return UsageError("give pose files, or a built-in --motion");
   }
+  DEFORM_ASSIGN_OR_RETURN(
+      const DeformOptions frames,
+      options.format.For(options.delivery == "every" ? Delivery::kEvery
+                                                     : Delivery::kLatest));
   DEFORM_RETURN_IF_ERROR(PrepareDirectory(options.out_dir));
   DEFORM_ASSIGN_OR_RETURN(const std::unique_ptr<Stage> stage,
                           Stage::Open(context, options.stage));
@@ -152,9 +166,7 @@ absl::Status Run(const Options& options, Context& context) {
                           Script::Create(options, stage->rig(), *stage));
   DEFORM_ASSIGN_OR_RETURN(
       DeformStream stream,
-      stage->client().Deform(
-          stage->session().session_id,
-          options.delivery == "every" ? Delivery::kEvery : Delivery::kLatest));
+      stage->client().Deform(stage->session().session_id, frames));
   Progress progress(context.console, "playing", &context.interruption);
   const PlayOptions play{.poses = script.size(),
                          .in_flight = options.in_flight,
@@ -203,6 +215,7 @@ Action Setup(CLI::App& app) {
   app.add_option("--out-dir", options->out_dir,
                  "Write each frame as a file; without it only figures are told")
       ->type_name("DIR");
+  options->format.AddTo(app);
   options->stage.AddTo(app);
   return [options](Context& context) { return Run(*options, context); };
 }
@@ -216,7 +229,8 @@ const Command& PlayCommand() {
       "--out-dir frames\n"
       "deformctl play --motion twist --model-file a.obj --cage c.obj\n"
       "deformctl play --motion bend --binding $binding --rate 60 "
-      "--delivery latest",
+      "--delivery latest\n"
+      "deformctl play --motion bend --binding $binding --frame-tolerance 1e-5",
       "", Setup};
   return command;
 }

@@ -15,6 +15,7 @@ class Float32 final : public FrameEncoding {
  public:
   absl::string_view id() const override { return "float32"; }
   bool is_exact() const override { return true; }
+  double FinestTolerance(double /*reach*/) const override { return 0; }
 
   int64_t PointsPerChunk(int dimension) const override {
     return kMaxChunkBytes / (dimension * int64_t{sizeof(float)});

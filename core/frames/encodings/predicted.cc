@@ -184,6 +184,9 @@ class Predicted final : public FrameEncoding {
  public:
   absl::string_view id() const override { return "predicted"; }
   bool uses_grid() const override { return true; }
+  double FinestTolerance(double reach) const override {
+    return reach / kGridLimit;
+  }
 
   int64_t PointsPerChunk(int dimension) const override {
     return kMaxChunkBytes / MaxBlockBytes(dimension) * kGridBlock;

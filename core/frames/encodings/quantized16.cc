@@ -115,6 +115,10 @@ absl::Status FindSides(const ChunkSource& source, Side (&sides)[3]) {
 class Quantized16 final : public FrameEncoding {
  public:
   absl::string_view id() const override { return "quantized16"; }
+  double FinestTolerance(double reach) const override {
+    const Side side{.min = -reach, .step = 2 * reach / kLargest};
+    return std::sqrt(3.0) * side.Error();
+  }
 
   int64_t PointsPerChunk(int dimension) const override {
     return (kMaxChunkBytes - dimension * kSideBytes) / (2 * dimension);

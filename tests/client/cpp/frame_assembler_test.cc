@@ -5,6 +5,10 @@
 
 #include <cstring>
 #include <functional>
+#include <numeric>
+#include <optional>
+
+#include "core/base/error.h"
 
 namespace deform {
 namespace {
@@ -18,6 +22,7 @@ v1::FrameChunk Chunk(int first, int count, bool last) {
   chunk.set_revision(7);
   chunk.set_epoch(1);
   chunk.set_answers_sequence(5);
+  chunk.set_encoding("float32");
   chunk.set_first_vertex(first);
   chunk.set_vertex_count(count);
   chunk.set_last(last);
@@ -35,9 +40,7 @@ v1::FrameChunk Keyframe(int first, int count, bool last) {
   return chunk;
 }
 
-FrameAssembler NewAssembler() {
-  return FrameAssembler(*FindEncoding("float32"), 3, kPoints);
-}
+FrameAssembler NewAssembler() { return FrameAssembler(3, kPoints); }
 
 TEST(FrameAssembler, PutsChunksTogether) {
   FrameAssembler assembler = NewAssembler();
@@ -52,7 +55,7 @@ TEST(FrameAssembler, PutsChunksTogether) {
   EXPECT_EQ(positions(2, 2), 3008);
 }
 
-TEST(FrameAssembler, KeepsTheOriginUntilTheNextKeyframe) {
+TEST(FrameAssembler, KeepsTheOriginUntilTheNextIsTold) {
   FrameAssembler assembler = NewAssembler();
   Frame frame;
   ASSERT_TRUE(*assembler.Add(Keyframe(0, 3, true), frame));
@@ -83,10 +86,128 @@ TEST(FrameAssembler, ANewerEpochAbandonsAHalfFrame) {
   EXPECT_EQ(frame.revision, 9u);
 }
 
+// Of points [first, ...).
+v1::PointOrderChunk Order(uint64_t first, std::vector<int32_t> points) {
+  v1::PointOrderChunk chunk;
+  chunk.set_first(first);
+  chunk.mutable_data()->assign(reinterpret_cast<const char*>(points.data()),
+                               points.size() * sizeof(int32_t));
+  return chunk;
+}
+
+// All points on a grid of step 0.5, each coordinate of the i-th of the order
+// at `from + i`.
+v1::FrameChunk OnGrid(uint64_t revision, int from,
+                      std::optional<int> reference = std::nullopt) {
+  const auto grid_from = [](int q) {
+    Grid grid(kPoints);
+    for (int d = 0; d < 3; ++d) {
+      std::iota(grid.coordinate(d), grid.coordinate(d) + kPoints, q);
+    }
+    grid.Pad();
+    return grid;
+  };
+  const Grid grid = grid_from(from);
+  const Grid before = grid_from(reference.value_or(0));
+  std::vector<uint8_t> bytes(kMaxChunkBytes);
+  const ChunkSource source{.count = kPoints,
+                           .grid = &grid,
+                           .reference = reference ? &before : nullptr};
+  const int64_t size =
+      FindEncoding("predicted")->Encode(source, bytes.data()).value();
+  v1::FrameChunk chunk;
+  chunk.set_revision(revision);
+  chunk.set_encoding("predicted");
+  chunk.set_keyframe(!reference);
+  if (!reference) {
+    for (int d = 0; d < 3; ++d) chunk.add_origin(100);
+  }
+  chunk.set_step(0.5);
+  chunk.set_vertex_count(kPoints);
+  chunk.set_last(true);
+  chunk.mutable_data()->assign(bytes.begin(), bytes.begin() + size);
+  return chunk;
+}
+v1::FrameChunk Predicted(uint64_t revision, int from, uint64_t reference,
+                         int reference_from) {
+  v1::FrameChunk chunk = OnGrid(revision, from, reference_from);
+  chunk.set_reference_revision(reference);
+  return chunk;
+}
+
+TEST(FrameAssembler, AddsWhatAFrameDiffersByFromTheOneThatIsHeld) {
+  FrameAssembler assembler = NewAssembler();
+  ASSERT_TRUE(assembler.AddOrder(Order(0, {2, 1})).ok());
+  ASSERT_TRUE(assembler.AddOrder(Order(2, {0})).ok());
+  Frame frame;
+  ASSERT_TRUE(*assembler.Add(OnGrid(4, 10), frame));
+  EXPECT_TRUE(frame.keyframe);
+  EXPECT_EQ(frame.DoublePositions()(2, 0), 100 + 10 * 0.5);
+  EXPECT_EQ(frame.DoublePositions()(0, 1), 100 + 12 * 0.5);
+  ASSERT_TRUE(*assembler.Add(Predicted(6, 20, 4, 10), frame));
+  EXPECT_FALSE(frame.keyframe);
+  EXPECT_EQ(frame.DoublePositions()(2, 2), 100 + 20 * 0.5);
+}
+
+TEST(FrameAssembler, FramesOfFloatsInBetweenChangeNothingThatIsHeld) {
+  FrameAssembler assembler = NewAssembler();
+  ASSERT_TRUE(assembler.AddOrder(Order(0, {2, 1, 0})).ok());
+  Frame frame;
+  ASSERT_TRUE(*assembler.Add(OnGrid(4, 10), frame));
+  v1::FrameChunk floats = Chunk(0, 3, true);
+  floats.set_epoch(0);
+  ASSERT_TRUE(*assembler.Add(floats, frame));
+  ASSERT_TRUE(*assembler.Add(Predicted(8, 20, 4, 10), frame));
+  EXPECT_EQ(frame.DoublePositions()(2, 2), 100 + 20 * 0.5);
+}
+
+TEST(FrameAssembler, ANewerEpochHoldsNothing) {
+  FrameAssembler assembler = NewAssembler();
+  ASSERT_TRUE(assembler.AddOrder(Order(0, {2, 1, 0})).ok());
+  Frame frame;
+  ASSERT_TRUE(*assembler.Add(OnGrid(4, 10), frame));
+  v1::FrameChunk next = Predicted(5, 20, 4, 10);
+  next.set_epoch(1);
+  EXPECT_THAT(std::string(assembler.Add(next, frame).status().message()),
+              HasSubstr("refers to revision 4, which is not held"));
+}
+
+struct BadOrder {
+  const char* name;
+  std::vector<v1::PointOrderChunk> chunks;  // The last is wrong.
+  const char* message;
+};
+class FrameAssemblerRefusesOrder : public testing::TestWithParam<BadOrder> {};
+
+TEST_P(FrameAssemblerRefusesOrder, ThatIsNone) {
+  FrameAssembler assembler = NewAssembler();
+  const auto& chunks = GetParam().chunks;
+  for (size_t i = 0; i + 1 < chunks.size(); ++i) {
+    ASSERT_TRUE(assembler.AddOrder(chunks[i]).ok());
+  }
+  const absl::Status status = assembler.AddOrder(chunks.back());
+  EXPECT_EQ(DetailOf(status).reason, "BAD_POINT_ORDER");
+  EXPECT_THAT(std::string(status.message()), HasSubstr(GetParam().message));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Orders, FrameAssemblerRefusesOrder,
+    testing::ValuesIn<BadOrder>({
+        {"TooLong", {Order(0, {0, 1, 2, 3})}, "where 0 of 3 points were"},
+        {"Empty", {Order(0, {})}, "with 0 bytes"},
+        {"Gap", {Order(0, {0}), Order(2, {2})}, "at point 2 with 4 bytes"},
+        {"TwicePoint", {Order(0, {0, 1, 1})}, "names point 1 twice"},
+        {"Again",
+         {Order(0, {0, 1, 2}), Order(0, {0, 1, 2})},
+         "it was complete"},
+    }),
+    [](const auto& test) { return test.param.name; });
+
 struct BadChunks {
   const char* name;
   std::function<std::vector<v1::FrameChunk>()> chunks;  // The last is wrong.
   const char* message;
+  bool with_order = false;
 };
 
 void PrintTo(const BadChunks& chunks, std::ostream* out) {
@@ -98,6 +219,9 @@ class FrameAssemblerRefuses : public testing::TestWithParam<BadChunks> {};
 TEST_P(FrameAssemblerRefuses, ABadChunk) {
   FrameAssembler assembler = NewAssembler();
   Frame frame;
+  if (GetParam().with_order) {
+    ASSERT_TRUE(assembler.AddOrder(Order(0, {2, 1, 0})).ok());
+  }
   const std::vector<v1::FrameChunk> chunks = GetParam().chunks();
   for (size_t i = 0; i + 1 < chunks.size(); ++i) {
     ASSERT_TRUE(assembler.Add(chunks[i], frame).ok());
@@ -112,7 +236,7 @@ INSTANTIATE_TEST_SUITE_P(
     Frames, FrameAssemblerRefuses,
     testing::ValuesIn<BadChunks>({
         {"WithoutOrigin", [] { return std::vector{Chunk(0, 3, true)}; },
-         "the first frame is no keyframe"},
+         "the first frame tells no origin"},
         {"ShortOrigin",
          [] {
            v1::FrameChunk chunk = Keyframe(0, 3, true);
@@ -152,6 +276,50 @@ INSTANTIATE_TEST_SUITE_P(
            return std::vector{Keyframe(0, 1, false), second};
          },
          "revision 8 begins within revision 7"},
+        {"MixedEncodings",
+         [] {
+           v1::FrameChunk second = Chunk(1, 2, true);
+           second.set_encoding("quantized16");
+           return std::vector{Keyframe(0, 1, false), second};
+         },
+         "encoding \"quantized16\" within one of \"float32\""},
+        {"UnknownEncoding",
+         [] {
+           v1::FrameChunk chunk = Keyframe(0, 3, true);
+           chunk.set_encoding("lz");
+           return std::vector{chunk};
+         },
+         "encoding \"lz\" is not known"},
+        {"GridWithoutOrder", [] { return std::vector{OnGrid(1, 0)}; },
+         "the order of points has not come"},
+        {"NothingHeld",
+         [] {
+           v1::FrameChunk chunk = OnGrid(2, 0);
+           chunk.set_keyframe(false);
+           chunk.set_reference_revision(1);
+           return std::vector{chunk};
+         },
+         "revision 2 refers to revision 1, which is not held", true},
+        {"OtherHeld",
+         [] {
+           return std::vector{OnGrid(1, 0), OnGrid(2, 0),
+                              Predicted(3, 0, 1, 0)};
+         },
+         "revision 3 refers to revision 1, which is not held", true},
+        {"NoStep",
+         [] {
+           v1::FrameChunk chunk = OnGrid(1, 0);
+           chunk.set_step(0);
+           return std::vector{chunk};
+         },
+         "the grid has step 0", true},
+        {"ShortGrid",
+         [] {
+           v1::FrameChunk chunk = OnGrid(1, 0);
+           chunk.mutable_data()->pop_back();
+           return std::vector{chunk};
+         },
+         "a block ends in its residuals", true},
     }),
     [](const auto& test) { return test.param.name; });
 

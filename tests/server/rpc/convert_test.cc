@@ -273,17 +273,33 @@ TEST(ConvertPose, RefusesOddLengthsAndHugeIndices) {
   EXPECT_EQ(DetailOf(status).field, "pose.vertices");
 }
 
-TEST(ConvertJoin, PicksTheFirstEncodingItKnows) {
+TEST(ConvertJoin, KeepsTheEncodingsItKnowsInTheirOrder) {
   v1::Join join;
   join.set_session_id("s");
-  EXPECT_EQ(FromProto(join)->encoding->id(), "float32");
+  EXPECT_TRUE(FromProto(join)->frames.encodings.empty());
   join.add_encodings("holographic");
-  join.add_encodings("predicted");  // Would need a tolerance.
+  join.add_encodings("predicted");
   join.add_encodings("float32");
-  EXPECT_EQ(FromProto(join)->encoding->id(), "float32");
+  EXPECT_EQ(FromProto(join)->frames.encodings,
+            (std::vector<const FrameEncoding*>{FindEncoding("predicted"),
+                                               FindEncoding("float32")}));
   EXPECT_EQ(FromProto(join)->delivery, Delivery::kLatest);
   join.set_delivery(v1::DELIVERY_EVERY);
   EXPECT_EQ(FromProto(join)->delivery, Delivery::kEvery);
+}
+
+TEST(ConvertJoin, KeepsWhatIsSaidOfTheTolerance) {
+  v1::Join join;
+  join.set_session_id("s");
+  EXPECT_FALSE(FromProto(join)->frames.tolerance.has_value());
+  EXPECT_FALSE(FromProto(join)->frames.tolerance_fraction.has_value());
+  EXPECT_FALSE(FromProto(join)->frames.cheapest);
+  join.set_tolerance(0.5);
+  join.set_tolerance_fraction(0);
+  join.set_cheapest_encoding(true);
+  EXPECT_EQ(FromProto(join)->frames.tolerance, 0.5);
+  EXPECT_EQ(FromProto(join)->frames.tolerance_fraction, 0.0);
+  EXPECT_TRUE(FromProto(join)->frames.cheapest);
 }
 
 TEST(ConvertJoin, RefusesWhatItDoesNotKnow) {
@@ -293,7 +309,9 @@ TEST(ConvertJoin, RefusesWhatItDoesNotKnow) {
   join.add_encodings("holographic");
   absl::Status status = FromProto(join).status();
   EXPECT_EQ(DetailOf(status).reason, "UNKNOWN_ENCODING");
-  EXPECT_EQ(status.message(), "none of the encodings is known; known: float32");
+  EXPECT_EQ(status.message(),
+            "none of the encodings is known; known: float32, quantized16, "
+            "predicted");
   join.set_delivery(static_cast<v1::Delivery>(5));
   status = FromProto(join).status();
   EXPECT_EQ(status.message(), "delivery 5 is not known");

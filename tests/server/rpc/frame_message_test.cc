@@ -43,7 +43,7 @@ TEST(FrameMessage, IsAValidMessage) {
   const FrameToSend send{.frame = TwoChunks(),
                          .answers_sequence = 9,
                          .skipped_revisions = 2,
-                         .keyframe = true};
+                         .tells_origin = true};
   const v1::FrameChunk first = Parsed(send, 0);
   EXPECT_EQ(first.revision(), 300u);
   EXPECT_EQ(first.epoch(), 4u);
@@ -65,7 +65,7 @@ TEST(FrameMessage, IsAValidMessage) {
 
 TEST(FrameMessage, LaterChunksSayOnlyWhatIsTheirs) {
   const FrameToSend send{
-      .frame = TwoChunks(), .skipped_revisions = 2, .keyframe = true};
+      .frame = TwoChunks(), .skipped_revisions = 2, .tells_origin = true};
   const v1::FrameChunk last = Parsed(send, 1);
   EXPECT_TRUE(last.last());
   EXPECT_TRUE(last.keyframe());
@@ -75,8 +75,41 @@ TEST(FrameMessage, LaterChunksSayOnlyWhatIsTheirs) {
   EXPECT_EQ(last.data(), std::string(12, '\1'));
 }
 
-TEST(FrameMessage, TellsNoOriginWithoutAKeyframe) {
+TEST(FrameMessage, TellsNoOriginThatIsKnown) {
   EXPECT_EQ(Parsed({.frame = TwoChunks()}, 0).origin_size(), 0);
+}
+
+TEST(FrameMessage, TellsWhatAFrameOnAGridRefersTo) {
+  const auto frame = TwoChunks();
+  frame->grid = std::make_shared<const RevisionGrid>(
+      RevisionGrid{.revision = 300, .step = 0.25, .grid = Grid(3)});
+  frame->error_bound = 0.5;
+  EXPECT_TRUE(Parsed({.frame = frame}, 0).keyframe());
+  frame->reference_revision = 298;
+  for (const size_t chunk : {0, 1}) {
+    EXPECT_FALSE(Parsed({.frame = frame}, chunk).keyframe());
+    EXPECT_EQ(Parsed({.frame = frame}, chunk).reference_revision(), 298u);
+  }
+  EXPECT_EQ(Parsed({.frame = frame}, 0).step(), 0.25);
+  EXPECT_EQ(Parsed({.frame = frame}, 0).error_bound(), 0.5);
+}
+
+TEST(OrderMessage, TellsTheIndicesInParts) {
+  // 1 MiB holds 2^18 of them.
+  constexpr int64_t kPoints = (1 << 18) + 3;
+  Positions line = Positions::Zero(kPoints, 3);
+  line.col(0).setLinSpaced(kPoints, 1, 0);
+  const auto order = std::make_shared<const PointOrder>(line);
+  ASSERT_EQ(OrderMessages(*order), 2u);
+  std::string bytes;
+  for (const size_t part : {0, 1}) {
+    v1::DeformResponse response;
+    ASSERT_TRUE(ParseMessage(OrderMessage(order, part), response));
+    EXPECT_EQ(response.point_order().first(), bytes.size() / 4);
+    bytes += response.point_order().data();
+  }
+  const std::vector<uint8_t> all = order->ToBytes();
+  EXPECT_EQ(bytes, std::string(all.begin(), all.end()));
 }
 
 TEST(FrameMessage, DoesNotCopyTheData) {

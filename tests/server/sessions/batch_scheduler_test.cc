@@ -31,8 +31,7 @@ class BatchSchedulerTest : public testing::Test {
         id, rooms_.bindings().Use("t", binding_id, "session " + id).value(), {},
         rooms_.Environment());
     posed.stream.participant =
-        posed.session
-            ->Join(delivery, *FindEncoding("float32"), posed.stream.receiver)
+        posed.session->Join(delivery, FrameWishes{}, posed.stream.receiver)
             .value()
             .participant;
     rooms_.executor.RunAll();
@@ -132,8 +131,7 @@ TEST_F(BatchSchedulerTest, NewcomersAreShownWhatIsWithTheStepsOfOthers) {
   a.MoveTo(0.1);
   FakeStream late;
   late.participant =
-      b.session
-          ->Join(Delivery::kLatest, *FindEncoding("float32"), late.receiver)
+      b.session->Join(Delivery::kLatest, FrameWishes{}, late.receiver)
           .value()
           .participant;
   rooms_.executor.RunAll();
@@ -223,7 +221,7 @@ TEST_F(BatchSchedulerTest, SessionsGetEveryFrameInOrderFromManyThreads) {
         {}, environment);
     echoes.push_back(std::make_shared<Echo>());
     echoes.back()->Begin(
-        session->Join(Delivery::kEvery, *FindEncoding("float32"), echoes.back())
+        session->Join(Delivery::kEvery, FrameWishes{}, echoes.back())
             .value()
             .participant);
   }

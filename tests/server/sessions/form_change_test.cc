@@ -38,8 +38,8 @@ class FormChangeTest : public testing::Test {
 
   FakeStream Join(const std::shared_ptr<Session>& session) {
     FakeStream stream;
-    auto joined = session->Join(Delivery::kEvery, *FindEncoding("float32"),
-                                stream.receiver);
+    auto joined =
+        session->Join(Delivery::kEvery, FrameWishes{}, stream.receiver);
     stream.participant = std::move(joined->participant);
     compute_.RunAll();
     stream.TakeFrame();

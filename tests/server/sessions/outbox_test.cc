@@ -89,10 +89,10 @@ TEST(Outbox, TellsAnOriginOnce) {
   outbox.Offer(FrameOf(1, 1), 0);
   outbox.Offer(FrameOf(2, 2), 0);
   outbox.Offer(FrameOf(3, 2), 0);
-  EXPECT_TRUE(TakeFrame(outbox).keyframe);
-  EXPECT_FALSE(TakeFrame(outbox).keyframe);
-  EXPECT_TRUE(TakeFrame(outbox).keyframe);
-  EXPECT_FALSE(TakeFrame(outbox).keyframe);
+  EXPECT_TRUE(TakeFrame(outbox).tells_origin);
+  EXPECT_FALSE(TakeFrame(outbox).tells_origin);
+  EXPECT_TRUE(TakeFrame(outbox).tells_origin);
+  EXPECT_FALSE(TakeFrame(outbox).tells_origin);
 }
 
 TEST(Outbox, TellsTheOriginAlsoWhenItsFirstFrameWasSkipped) {
@@ -101,7 +101,30 @@ TEST(Outbox, TellsTheOriginAlsoWhenItsFirstFrameWasSkipped) {
   TakeFrame(outbox);
   outbox.Offer(FrameOf(1, 2), 0);
   outbox.Offer(FrameOf(2, 2), 0);
-  EXPECT_TRUE(TakeFrame(outbox).keyframe);
+  EXPECT_TRUE(TakeFrame(outbox).tells_origin);
+}
+
+TEST(Outbox, TellsTheOrderOfPointsOnceBeforeTheFirstFrameOnAGrid) {
+  Outbox outbox(Delivery::kEvery);
+  auto on_grid = std::make_shared<Frame>();
+  on_grid->info.revision = 1;
+  on_grid->order =
+      std::make_shared<const PointOrder>(Positions(Positions::Zero(1, 3)));
+  outbox.Offer(FrameOf(0), 0);
+  outbox.Offer(on_grid, 0);
+  outbox.Offer(on_grid, 0);
+  TakeFrame(outbox);
+  EXPECT_EQ(std::get<OrderToSend>(outbox.Take().value()).order, on_grid->order);
+  TakeFrame(outbox);
+  TakeFrame(outbox);
+}
+
+TEST(Outbox, ARevisionThatComesAgainSkipsNone) {
+  Outbox outbox(Delivery::kLatest);
+  for (int i = 0; i < 2; ++i) {
+    outbox.Offer(FrameOf(7), 0);
+    EXPECT_EQ(TakeFrame(outbox).skipped_revisions, 0u);
+  }
 }
 
 TEST(Outbox, SendsRejectionsBeforeFrames) {

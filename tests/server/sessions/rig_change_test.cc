@@ -65,8 +65,7 @@ class RigChangeTest : public testing::Test {
 
   FakeStream Join(Delivery delivery = Delivery::kLatest) {
     FakeStream stream;
-    auto joined =
-        session_->Join(delivery, *FindEncoding("float32"), stream.receiver);
+    auto joined = session_->Join(delivery, FrameWishes{}, stream.receiver);
     stream.participant = std::move(joined->participant);
     stream.joined = joined->state;
     stream.pose = joined->pose;

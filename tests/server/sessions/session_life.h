@@ -50,8 +50,8 @@ class SessionLife {
   // Joins; the stream lives as long as this.
   FakeStream& Join(const std::string& id) {
     FakeStream& stream = streams_.emplace_back();
-    auto joined = Find(id)->Join(Delivery::kLatest, *FindEncoding("float32"),
-                                 stream.receiver);
+    auto joined =
+        Find(id)->Join(Delivery::kLatest, FrameWishes{}, stream.receiver);
     EXPECT_TRUE(joined.ok()) << joined.status();
     stream.participant = std::move(joined->participant);
     stream.joined = joined->state;

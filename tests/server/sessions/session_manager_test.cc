@@ -107,8 +107,7 @@ TEST_F(SessionManagerTest, DeletingEndsTheStreams) {
   const auto session = sessions_.Create("t", rooms_.binding_id, "mine").value();
   FakeStream stream;
   stream.participant =
-      session
-          ->Join(Delivery::kLatest, *FindEncoding("float32"), stream.receiver)
+      session->Join(Delivery::kLatest, FrameWishes{}, stream.receiver)
           .value()
           .participant;
   ASSERT_TRUE(sessions_.Delete("t", "mine").ok());
@@ -128,12 +127,11 @@ TEST_F(SessionManagerTest, DrainingTakesNothingNew) {
       sessions_.Create("t", rooms_.binding_id, "new").status();
   EXPECT_EQ(refused.code(), absl::StatusCode::kUnavailable);
   EXPECT_EQ(DetailOf(refused).reason, "SERVER_DRAINING");
-  EXPECT_EQ(session
-                ->Join(Delivery::kLatest, *FindEncoding("float32"),
-                       std::weak_ptr<Receiver>())
-                .status()
-                .code(),
-            absl::StatusCode::kUnavailable);
+  EXPECT_EQ(
+      session->Join(Delivery::kLatest, FrameWishes{}, std::weak_ptr<Receiver>())
+          .status()
+          .code(),
+      absl::StatusCode::kUnavailable);
 }
 
 }  // namespace

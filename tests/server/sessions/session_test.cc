@@ -18,8 +18,7 @@ class SessionTest : public testing::Test {
  protected:
   FakeStream Join(Delivery delivery) {
     FakeStream stream;
-    auto joined =
-        session_->Join(delivery, *FindEncoding("float32"), stream.receiver);
+    auto joined = session_->Join(delivery, FrameWishes{}, stream.receiver);
     EXPECT_TRUE(joined.ok()) << joined.status();
     stream.participant = std::move(joined->participant);
     stream.joined = joined->state;
@@ -55,7 +54,7 @@ TEST_F(SessionTest, ShowsTheStateAtJoining) {
   EXPECT_GT(stream.receiver->wakes, 0);
   const FrameToSend sent = stream.TakeFrame();
   EXPECT_EQ(sent.frame->info.revision, 0u);
-  EXPECT_TRUE(sent.keyframe);
+  EXPECT_TRUE(sent.tells_origin);
 }
 
 TEST_F(SessionTest, DeformsByTheNewestPose) {
@@ -111,7 +110,7 @@ TEST_F(SessionTest, LateJoinersSeeWhatIs) {
   const FrameToSend sent = late.TakeFrame();
   EXPECT_EQ(sent.frame->info.revision, 1u);
   EXPECT_EQ(sent.answers_sequence, 0u);
-  EXPECT_TRUE(sent.keyframe);
+  EXPECT_TRUE(sent.tells_origin);
 }
 
 TEST_F(SessionTest, WhoJoinsSeesTheStateBeforeItsOwnPoses) {
@@ -138,12 +137,12 @@ TEST_F(SessionTest, MovesTheOriginOnlyWhenTheRigHasMovedFar) {
   stream.participant->Submit(1, MovedBy({0.8, 0, 0}));  // D / 4 is 0.87.
   rooms_.executor.RunAll();
   FrameToSend sent = stream.TakeFrame();
-  EXPECT_FALSE(sent.keyframe);
+  EXPECT_FALSE(sent.tells_origin);
   EXPECT_EQ(sent.frame->info.origin, Vec3::Zero());
   stream.participant->Submit(2, MovedBy({1e6, 0, 0}));
   rooms_.executor.RunAll();
   sent = stream.TakeFrame();
-  EXPECT_TRUE(sent.keyframe);
+  EXPECT_TRUE(sent.tells_origin);
   EXPECT_EQ(sent.frame->info.origin, Vec3(1e6, 0, 0));
   // A million units away the model keeps its digits.
   Positions expected = Icosphere(0.5, 1).positions;
@@ -291,12 +290,12 @@ TEST_F(SessionTest, EndingTellsEverybody) {
   session_->End(absl::NotFoundError("gone"));
   EXPECT_EQ(stream.TakeEnd().message(), "gone");
   EXPECT_FALSE(stream.participant->WantsPoses());
-  EXPECT_EQ(session_
-                ->Join(Delivery::kLatest, *FindEncoding("float32"),
-                       std::weak_ptr<Receiver>())
-                .status()
-                .message(),
-            "gone");
+  EXPECT_EQ(
+      session_
+          ->Join(Delivery::kLatest, FrameWishes{}, std::weak_ptr<Receiver>())
+          .status()
+          .message(),
+      "gone");
 }
 
 TEST_F(SessionTest, EndingLetsTheBindingGo) {
@@ -319,7 +318,7 @@ TEST_F(SessionTest, DrainingAnswersWhatCameBefore) {
 TEST_F(SessionTest, HasRoomForSoManyParticipants) {
   std::vector<FakeStream> streams;
   for (int i = 0; i < 3; ++i) streams.push_back(Join(Delivery::kLatest));
-  const auto full = session_->Join(Delivery::kLatest, *FindEncoding("float32"),
+  const auto full = session_->Join(Delivery::kLatest, FrameWishes{},
                                    std::weak_ptr<Receiver>());
   EXPECT_EQ(full.status().message(),
             "the session has 3 participants, its limit (max-participants)");

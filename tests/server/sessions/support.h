@@ -7,6 +7,7 @@
 #include <functional>
 #include <future>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -184,29 +185,55 @@ inline PoseUpdate MoveVertex(int32_t vertex, const Vec3& to) {
   return {.vertices = {vertex}, .positions = position};
 }
 
-// What the chunks of a frame say, back in model units: N x 3.
-inline Positions Decoded(const Frame& frame) {
-  std::vector<float> all;
-  for (const Frame::Chunk& chunk : frame.chunks) {
-    std::vector<float> part(chunk.vertex_count * frame.dimension);
-    EXPECT_TRUE(
-        frame.encoding
-            ->Decode({chunk.bytes.get(), static_cast<size_t>(chunk.size)},
-                     {.dimension = frame.dimension,
-                      .first = chunk.first_vertex,
-                      .count = chunk.vertex_count,
-                      .positions = part})
-            .ok());
-    all.insert(all.end(), part.begin(), part.end());
-  }
-  Positions positions =
-      Positions::Zero(static_cast<int64_t>(all.size()) / frame.dimension, 3);
-  for (int64_t i = 0; i < positions.rows(); ++i) {
-    for (int c = 0; c < frame.dimension; ++c) {
-      positions(i, c) = frame.info.origin[c] + all[i * frame.dimension + c];
+// The other end of a stream: what the chunks of its frames say.
+class FrameDecoder {
+ public:
+  // Back in model units, N x 3. Frames as they were sent: each refers to none,
+  // or to the one on a grid before.
+  Positions Decode(const Frame& frame) {
+    const int64_t points =
+        frame.chunks.back().first_vertex + frame.chunks.back().vertex_count;
+    std::vector<float> all(points * frame.dimension);
+    Grid grid(frame.grid == nullptr ? 0 : points);
+    if (frame.reference_revision) {
+      EXPECT_TRUE(held_.has_value());
+      EXPECT_EQ(*frame.reference_revision, held_revision_);
     }
+    for (const Frame::Chunk& chunk : frame.chunks) {
+      EXPECT_TRUE(
+          frame.encoding
+              ->Decode(
+                  {chunk.bytes.get(), static_cast<size_t>(chunk.size)},
+                  {.dimension = frame.dimension,
+                   .first = chunk.first_vertex,
+                   .count = chunk.vertex_count,
+                   .positions = std::span(all).subspan(
+                       chunk.first_vertex * frame.dimension,
+                       chunk.vertex_count * frame.dimension),
+                   .grid = frame.grid == nullptr ? nullptr : &grid,
+                   .reference = frame.reference_revision ? &*held_ : nullptr})
+              .ok());
+    }
+    if (frame.grid != nullptr) {
+      TakeOffGrid(grid, frame.grid->step, *frame.order, frame.dimension, all);
+      held_ = std::move(grid);
+      held_revision_ = frame.info.revision;
+    }
+    Positions positions = Positions::Zero(points, 3);
+    for (int64_t i = 0; i < points; ++i) {
+      for (int c = 0; c < frame.dimension; ++c) {
+        positions(i, c) = frame.info.origin[c] + all[i * frame.dimension + c];
+      }
+    }
+    return positions;
   }
-  return positions;
+
+ private:
+  std::optional<Grid> held_;
+  uint64_t held_revision_ = 0;
+};
+inline Positions Decoded(const Frame& frame) {
+  return FrameDecoder().Decode(frame);
 }
 
 }  // namespace deform::server

@@ -1,0 +1,145 @@
+#include "server/sessions/frame_maker.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cstring>
+
+#include "core/base/status_macros.h"
+
+namespace deform::server {
+namespace {
+
+// An encoding may write up to a whole chunk whatever it returns, so it writes
+// here first and the frame keeps what it needs.
+struct Scratch {
+  std::vector<float> positions;
+  std::vector<uint8_t> bytes;
+};
+Scratch& ThreadScratch() {
+  static thread_local Scratch scratch;
+  return scratch;
+}
+
+// `source` but for the positions, which encodings without a grid want.
+absl::StatusOr<Frame::Chunk> EncodeChunk(const Deformer& deformer,
+                                         const FrameEncoding& encoding,
+                                         const Vec3& origin,
+                                         ChunkSource source) {
+  Scratch& scratch = ThreadScratch();
+  scratch.bytes.resize(kMaxChunkBytes);
+  if (source.grid == nullptr) {
+    scratch.positions.resize(source.count * source.dimension);
+    deformer.CopyRelative(source.first, source.count, origin,
+                          scratch.positions.data());
+    source.positions = scratch.positions;
+  }
+  DEFORM_ASSIGN_OR_RETURN(const int64_t size,
+                          encoding.Encode(source, scratch.bytes.data()));
+  Frame::Chunk chunk{.first_vertex = source.first,
+                     .vertex_count = source.count,
+                     .size = size,
+                     .bytes = std::make_unique_for_overwrite<uint8_t[]>(size)};
+  std::memcpy(chunk.bytes.get(), scratch.bytes.data(), size);
+  return chunk;
+}
+
+// Calls body(i) for i < count; the first error by i.
+template <typename Body>
+absl::Status ForEachChunk(int64_t count, ThreadPool* pool, Body body) {
+  std::vector<absl::Status> statuses(count);
+  const auto run = [&](int64_t i) { statuses[i] = body(i); };
+  if (pool == nullptr || count == 1) {
+    for (int64_t i = 0; i < count; ++i) run(i);
+  } else {
+    pool->ParallelFor(count, nullptr, run);
+  }
+  absl::Status first;
+  for (const absl::Status& status : statuses) first.Update(status);
+  return first;
+}
+
+}  // namespace
+
+double FrameMaker::ShareOf(double tolerance, double weight_error) {
+  if (weight_error == 0) return tolerance;
+  return weight_error <= 0.25 * tolerance ? 0.75 * tolerance : 0.5 * tolerance;
+}
+
+Frames FrameMaker::Make(const Deformer& deformer, const FrameInfo& info,
+                        std::span<const FrameKey> keys, ThreadPool* pool) {
+  if (revision_ != info.revision) grids_.clear();
+  revision_ = info.revision;
+  const FrameKey exact{.format = {.encoding = FindEncoding("float32")}};
+  Frames frames;
+  for (const FrameKey& key : keys) {
+    if (frames.contains(key)) continue;
+    auto frame = Encode(deformer, info, key, pool);
+    if (!frame.ok()) {
+      auto& instead = frames[exact];
+      // Exact encodings take everything.
+      if (instead == nullptr) {
+        instead = Encode(deformer, info, exact, pool).value();
+      }
+      frame = instead;
+    }
+    frames[key] = *std::move(frame);
+  }
+  return frames;
+}
+
+absl::StatusOr<std::shared_ptr<const RevisionGrid>> FrameMaker::GridOf(
+    const Deformer& deformer, const FrameInfo& info, double step) {
+  const auto made = grids_.find(step);
+  if (made != grids_.end()) return made->second;
+  if (order_ == nullptr) order_ = orders_->Of(deformer.binding().model());
+  const int64_t points = deformer.binding().point_count();
+  const int dimension = deformer.binding().dimension();
+  std::vector<float>& positions = ThreadScratch().positions;
+  positions.resize(points * dimension);
+  deformer.CopyRelative(0, points, info.origin, positions.data());
+  DEFORM_ASSIGN_OR_RETURN(Grid grid,
+                          PutOnGrid(positions, dimension, step, *order_));
+  auto held = std::make_shared<const RevisionGrid>(RevisionGrid{
+      .revision = info.revision, .step = step, .grid = std::move(grid)});
+  grids_[step] = held;
+  return held;
+}
+
+absl::StatusOr<std::shared_ptr<const Frame>> FrameMaker::Encode(
+    const Deformer& deformer, const FrameInfo& info, const FrameKey& key,
+    ThreadPool* pool) {
+  const FrameEncoding& encoding = *key.format.encoding;
+  const double share = ShareOf(key.format.tolerance, info.weight_error);
+  auto frame = std::make_shared<Frame>();
+  frame->info = info;
+  frame->dimension = deformer.binding().dimension();
+  frame->encoding = &encoding;
+  frame->error_bound = info.weight_error + share;
+  if (encoding.uses_grid()) {
+    DEFORM_ASSIGN_OR_RETURN(frame->grid, GridOf(deformer, info, share));
+    frame->order = order_;
+    if (key.reference) frame->reference_revision = key.reference->revision;
+  }
+  const int64_t points = deformer.binding().point_count();
+  const int64_t per_chunk = encoding.PointsPerChunk(frame->dimension);
+  const int64_t chunks = (points + per_chunk - 1) / per_chunk;
+  frame->chunks.resize(chunks);
+  DEFORM_RETURN_IF_ERROR(
+      ForEachChunk(chunks, pool, [&](int64_t i) -> absl::Status {
+        const int64_t first = i * per_chunk;
+        DEFORM_ASSIGN_OR_RETURN(
+            frame->chunks[i],
+            EncodeChunk(
+                deformer, encoding, info.origin,
+                {.dimension = frame->dimension,
+                 .first = first,
+                 .count = std::min(per_chunk, points - first),
+                 .tolerance = share,
+                 .grid = frame->grid ? &frame->grid->grid : nullptr,
+                 .reference = key.reference ? &key.reference->grid : nullptr}));
+        return absl::OkStatus();
+      }));
+  return frame;
+}
+
+}  // namespace deform::server

@@ -1,0 +1,55 @@
+// Frames of a session's present revision, each made once.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/base/thread_pool.h"
+#include "core/deform/deformer.h"
+#include "server/sessions/frame.h"
+#include "server/sessions/point_orders.h"
+
+namespace deform::server {
+
+using Frames = std::map<FrameKey, std::shared_ptr<const Frame>>;
+
+// Not thread-safe: used by one step at a time, since it keeps what frames of
+// the present revision share.
+class FrameMaker {
+ public:
+  explicit FrameMaker(std::shared_ptr<PointOrders> orders)
+      : orders_(std::move(orders)) {}
+
+  // Encodes where `deformer` is, for every key, chunks in parallel on `pool`
+  // (may be null). Where an encoding cannot keep its tolerance the frame is
+  // float32, and shared with those who want that.
+  Frames Make(const Deformer& deformer, const FrameInfo& info,
+              std::span<const FrameKey> keys, ThreadPool* pool);
+
+  // What of `tolerance` is left to an encoding by weights that may have moved a
+  // point by `weight_error`. All if that is 0; else 3/4 or 1/2: few values, so
+  // that points at rest keep their places on the grid while others move. Where
+  // the weights take more than half, Frame::error_bound exceeds the tolerance.
+  static double ShareOf(double tolerance, double weight_error);
+
+ private:
+  using Grids = std::map<double, std::shared_ptr<const RevisionGrid>>;
+
+  absl::StatusOr<std::shared_ptr<const RevisionGrid>> GridOf(
+      const Deformer& deformer, const FrameInfo& info, double step);
+  absl::StatusOr<std::shared_ptr<const Frame>> Encode(const Deformer& deformer,
+                                                      const FrameInfo& info,
+                                                      const FrameKey& key,
+                                                      ThreadPool* pool);
+
+  const std::shared_ptr<PointOrders> orders_;
+  std::shared_ptr<const PointOrder> order_;  // Once a grid was wanted.
+  uint64_t revision_ = 0;
+  Grids grids_;  // Of the revision, by step.
+};
+
+}  // namespace deform::server

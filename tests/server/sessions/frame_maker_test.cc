@@ -1,0 +1,155 @@
+#include "server/sessions/frame_maker.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/server/sessions/support.h"
+
+namespace deform::server {
+namespace {
+
+// Half a unit in the last place of float, for coordinates up to 1.
+constexpr double kFloatUlp = 6e-8;
+constexpr double kTolerance = 1e-4;
+
+std::shared_ptr<const Binding> BindBall(int subdivisions) {
+  return Bind({.model = std::make_shared<const Mesh>(
+                   MeshOf(Icosphere(0.5, subdivisions))),
+               .rig = BallCage(),
+               .scheme = "green"},
+              {})
+      .value();
+}
+
+Pose PoseOf(const PoseUpdate& update) {
+  Pose pose = RestPose(Rig(BallCage()));
+  ApplyPoseUpdate(update, pose);
+  return pose;
+}
+
+class FrameMakerTest : public testing::Test {
+ protected:
+  static FrameKey KeyOf(const char* encoding, double tolerance = 0) {
+    return {
+        .format = {.encoding = FindEncoding(encoding), .tolerance = tolerance}};
+  }
+  std::shared_ptr<const Frame> MakeOne(const FrameKey& key,
+                                       const FrameInfo& info) {
+    return maker_.Make(deformer_, info, {&key, 1}, nullptr).at(key);
+  }
+  double ErrorOf(const Positions& decoded) const {
+    return (decoded - deformer_.positions()).rowwise().norm().maxCoeff();
+  }
+
+  FrameMaker maker_{std::make_shared<PointOrders>()};
+  Deformer deformer_{BindBall(1), nullptr};
+};
+
+TEST_F(FrameMakerTest, WritesEveryVertexRelativeToTheOrigin) {
+  const auto frame =
+      MakeOne(KeyOf("float32"), {.revision = 7, .origin = {0.1, 0, -0.2}});
+  EXPECT_EQ(frame->info.revision, 7u);
+  EXPECT_EQ(frame->error_bound, 0);
+  ASSERT_EQ(frame->chunks.size(), 1u);
+  EXPECT_EQ(frame->chunks[0].vertex_count, kBallPoints);
+  EXPECT_LT(ErrorOf(FrameDecoder().Decode(*frame)), 2 * kFloatUlp);
+}
+
+TEST_F(FrameMakerTest, CutsLargeModelsIntoChunksInOrder) {
+  ThreadPool pool({.threads = 2});
+  // 163,842 points: 1.9 MB.
+  const Deformer deformer(BindBall(7), &pool);
+  const FrameKey keys[] = {KeyOf("float32"), KeyOf("predicted", kTolerance)};
+  for (const auto& [key, frame] : maker_.Make(deformer, {}, keys, &pool)) {
+    ASSERT_GE(frame->chunks.size(), 2u);
+    int64_t next = 0;
+    for (const Frame::Chunk& chunk : frame->chunks) {
+      EXPECT_EQ(chunk.first_vertex, next);
+      EXPECT_LE(chunk.size, kMaxChunkBytes);
+      next += chunk.vertex_count;
+    }
+    EXPECT_EQ(next, deformer.binding().point_count());
+    EXPECT_LT((FrameDecoder().Decode(*frame) - deformer.positions())
+                  .rowwise()
+                  .norm()
+                  .maxCoeff(),
+              kTolerance);
+  }
+}
+
+TEST_F(FrameMakerTest, EveryEncodingKeepsItsTolerance) {
+  for (const FrameEncoding* encoding : AllEncodings()) {
+    const auto frame = MakeOne(
+        {.format = {.encoding = encoding, .tolerance = kTolerance}}, {});
+    EXPECT_EQ(frame->encoding, encoding);
+    EXPECT_FALSE(frame->reference_revision.has_value());
+    EXPECT_LE(ErrorOf(FrameDecoder().Decode(*frame)), kTolerance)
+        << encoding->id();
+  }
+}
+
+TEST_F(FrameMakerTest, PredictsFromWhatTheReceiverHolds) {
+  FrameKey key = KeyOf("predicted", kTolerance);
+  const auto first = MakeOne(key, {.revision = 3});
+  FrameDecoder receiver;
+  receiver.Decode(*first);
+  deformer_.MoveTo(PoseOf(MovedBy({0.1, 0.2, 0.3})));
+  key.reference = first->grid;
+  const auto next = MakeOne(key, {.revision = 5});
+  EXPECT_EQ(next->reference_revision, 3u);
+  EXPECT_LE(ErrorOf(receiver.Decode(*next)), kTolerance);
+  // All points have moved alike.
+  EXPECT_LT(next->chunks[0].size * 4, first->chunks[0].size);
+}
+
+TEST_F(FrameMakerTest, FramesOfARevisionShareTheirGrid) {
+  const FrameKey keyframe = KeyOf("predicted", kTolerance);
+  const auto old = MakeOne(keyframe, {.revision = 1});
+  const auto first = MakeOne(keyframe, {.revision = 2});
+  FrameKey key = keyframe;
+  key.reference = old->grid;
+  const auto other = MakeOne(key, {.revision = 2});
+  EXPECT_EQ(other->grid, first->grid);
+  EXPECT_NE(other->grid, old->grid);
+  EXPECT_EQ(other->order, old->order);
+}
+
+TEST_F(FrameMakerTest, TakesFloatsWhereAToleranceCannotBeKept) {
+  // 2^20 steps reach to 0.1; 65535 steps across the ball are 1.5e-5.
+  const FrameKey keys[] = {KeyOf("predicted", 1e-7), KeyOf("quantized16", 1e-6),
+                           KeyOf("float32")};
+  const Frames frames = maker_.Make(deformer_, {}, keys, nullptr);
+  for (const FrameKey& key : keys) {
+    EXPECT_EQ(frames.at(key), frames.at(keys[2]));
+    EXPECT_EQ(frames.at(key)->encoding->id(), "float32");
+    EXPECT_EQ(frames.at(key)->grid, nullptr);
+  }
+}
+
+TEST_F(FrameMakerTest, LeavesTheWeightsTheirPartOfTheTolerance) {
+  EXPECT_EQ(FrameMaker::ShareOf(1, 0), 1);
+  EXPECT_EQ(FrameMaker::ShareOf(1, 0.25), 0.75);
+  EXPECT_EQ(FrameMaker::ShareOf(1, 0.26), 0.5);
+  const auto frame = MakeOne(KeyOf("predicted", kTolerance),
+                             {.weight_error = 0.1 * kTolerance});
+  EXPECT_EQ(frame->grid->step, 0.75 * kTolerance);
+  EXPECT_DOUBLE_EQ(frame->error_bound, 0.85 * kTolerance);
+  // More than half: the encoding cannot make up for it, and the frame says so.
+  EXPECT_DOUBLE_EQ(MakeOne(KeyOf("predicted", kTolerance),
+                           {.revision = 1, .weight_error = kTolerance})
+                       ->error_bound,
+                   1.5 * kTolerance);
+}
+
+TEST(PointOrders, ModelsKeepTheirOrderAsLongAsSomebodyHoldsIt) {
+  PointOrders orders;
+  const auto ball = std::make_shared<const Mesh>(MeshOf(Icosphere(0.5, 1)));
+  const auto other = std::make_shared<const Mesh>(MeshOf(Icosphere(0.5, 2)));
+  const auto order = orders.Of(ball);
+  EXPECT_EQ(order->size(), ball->size());
+  EXPECT_EQ(orders.Of(ball), order);
+  EXPECT_EQ(orders.Of(other)->size(), other->size());
+}
+
+}  // namespace
+}  // namespace deform::server

@@ -1,0 +1,125 @@
+#include "server/sessions/frame_wishes.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "core/base/error.h"
+#include "tests/server/sessions/support.h"
+
+namespace deform::server {
+namespace {
+
+using testing::HasSubstr;
+
+const FrameEncoding* const kFloat32 = FindEncoding("float32");
+const FrameEncoding* const kQuantized16 = FindEncoding("quantized16");
+const FrameEncoding* const kPredicted = FindEncoding("predicted");
+// Of the cube.
+const double kDiagonal = std::sqrt(12.0);
+
+absl::StatusOr<FrameFormat> Pick(const FrameWishes& wishes) {
+  return PickFormat(wishes, Rig(BallCage()));
+}
+
+TEST(PickFormat, Float32NeedsNoWords) {
+  const FrameFormat format = Pick({}).value();
+  EXPECT_EQ(format.encoding, kFloat32);
+  EXPECT_EQ(format.tolerance, 0);
+}
+
+TEST(PickFormat, TakesTheFirst) {
+  const FrameFormat format =
+      Pick({.encodings = {kQuantized16, kPredicted}, .tolerance = 0.01})
+          .value();
+  EXPECT_EQ(format.encoding, kQuantized16);
+  EXPECT_EQ(format.tolerance, 0.01);
+}
+
+TEST(PickFormat, AToleranceMayBeAFractionOfTheDiagonal) {
+  const FrameFormat format =
+      Pick({.encodings = {kPredicted}, .tolerance_fraction = 1e-5}).value();
+  EXPECT_DOUBLE_EQ(format.tolerance, 1e-5 * kDiagonal);
+}
+
+TEST(PickFormat, PassesOverWhatCannotKeepTheTolerance) {
+  // 16 bits of a cube of side 2 are good for 2.7e-5.
+  const FrameFormat format =
+      Pick({.encodings = {kQuantized16, kPredicted}, .tolerance = 2e-5})
+          .value();
+  EXPECT_EQ(format.encoding, kPredicted);
+}
+
+TEST(PickFormat, TheCheapestIsWhatKeepsTheToleranceInFewestBytes) {
+  const std::vector<const FrameEncoding*> all = {kFloat32, kPredicted,
+                                                 kQuantized16};
+  const auto cheapest = [&](double tolerance) {
+    return Pick({.encodings = all, .cheapest = true, .tolerance = tolerance})
+        ->encoding;
+  };
+  EXPECT_EQ(cheapest(0.01), kPredicted);
+  EXPECT_EQ(cheapest(1e-9), kFloat32);
+  EXPECT_EQ(Pick({.encodings = {kFloat32, kQuantized16},
+                  .cheapest = true,
+                  .tolerance = 0.01})
+                ->encoding,
+            kQuantized16);
+}
+
+TEST(PickFormat, ReceiversOfFloatsShareWhateverTheirTolerance) {
+  EXPECT_EQ(Pick({.encodings = {kFloat32}, .tolerance = 0.01}).value(),
+            Pick({}).value());
+}
+
+struct BadWishes {
+  std::string name;
+  FrameWishes wishes;
+  std::string reason;
+  std::string message;
+};
+class PickFormatRefuses : public testing::TestWithParam<BadWishes> {};
+
+TEST_P(PickFormatRefuses, BadWishes) {
+  const absl::Status status = Pick(GetParam().wishes).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(DetailOf(status).reason, GetParam().reason);
+  EXPECT_THAT(std::string(status.message()), HasSubstr(GetParam().message));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Wishes, PickFormatRefuses,
+    testing::ValuesIn<BadWishes>({
+        {"BothTolerances",
+         {.tolerance = 1, .tolerance_fraction = 1},
+         "CONTRADICTION",
+         "tolerance and tolerance_fraction are both set: state one of them"},
+        {"NoTolerance",
+         {.encodings = {kPredicted, kFloat32}},
+         "TOLERANCE_MISSING",
+         "encoding \"predicted\" needs a tolerance: set tolerance (model "
+         "units) "
+         "or tolerance_fraction (of the rig's diagonal)"},
+        {"Zero",
+         {.encodings = {kPredicted}, .tolerance = 0},
+         "TOLERANCE_OUT_OF_RANGE",
+         "tolerance is 0, not within 1e-30 and 1e28"},
+        {"NotANumber",
+         {.encodings = {kPredicted}, .tolerance_fraction = NAN},
+         "TOLERANCE_OUT_OF_RANGE",
+         "tolerance is nan"},
+        {"Negative",
+         {.encodings = {kFloat32}, .tolerance = -1},
+         "TOLERANCE_OUT_OF_RANGE",
+         "tolerance is -1"},
+        {"TooFine",
+         {.encodings = {kPredicted, kQuantized16}, .tolerance = 1e-7},
+         "TOLERANCE_NOT_MET",
+         "none of the encodings keeps a tolerance of 1e-07 for a rig of "
+         "diagonal 3.4641: predicted keeps 9.53674e-07, quantized16 keeps "
+         "2.66"},
+    }),
+    [](const auto& test) { return test.param.name; });
+
+}  // namespace
+}  // namespace deform::server

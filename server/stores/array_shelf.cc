@@ -97,6 +97,9 @@ absl::StatusOr<bool> ArrayShelf::RemoveOrphan(const std::string& name,
   const Claim claim = Take(std::string(absl::StripSuffix(name, kUnfinished)));
   DEFORM_ASSIGN_OR_RETURN(const bool wanted, referred(name));
   if (wanted) return false;
+  // Finished while we waited for its claim, it has another name now.
+  DEFORM_ASSIGN_OR_RETURN(const bool there, Exists(files_, PathOf(name)));
+  if (!there) return false;
   {
     MutexLock lock(mutex_);
     if (holds_ > 0) return false;

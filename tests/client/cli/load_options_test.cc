@@ -73,7 +73,8 @@ INSTANTIATE_TEST_SUITE_P(
         {"Delivery", {"--delivery", "some"}, "--delivery: some not in"},
         {"Encoding",
          {"--encoding", "morse"},
-         "--encoding: there is no 'morse', only float32"},
+         "--encoding: there is no 'morse', only auto, float32, quantized16, "
+         "predicted"},
         {"LimitWithoutPercentile",
          {"--find-limit"},
          "--find-limit needs the limit, such as --p99 5ms"},
@@ -120,7 +121,8 @@ TEST(LoadText, TellsRatesAndPercentiles) {
   EXPECT_EQ(json["ok"], true);
   std::ostringstream text;
   Describe(LoadSubject{}, Report(), text);
-  EXPECT_THAT(text.str(), HasSubstr("250/s, 3.0 MB/s, 0 revisions skipped"));
+  EXPECT_THAT(text.str(),
+              HasSubstr("250/s, 3.0 MB/s, 12.0 kB each, 0 revisions skipped"));
   EXPECT_THAT(text.str(), HasSubstr("p50 1.00, p90 1.00, p99 1.00"));
 }
 

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <thread>
 
 #include "tests/server/stores/samples.h"
@@ -429,6 +430,24 @@ TEST_P(StoreContract, ServesManyThreads) {
     const SessionPose pose = Pose(Key("s" + std::to_string(t)));
     EXPECT_EQ(pose.revision, 20u);
     EXPECT_EQ(pose.pose.vertices(0, 0), t);
+  }
+}
+
+TEST_P(StoreContract, TakesNoFileForAnOrphanWhileItIsWritten) {
+  constexpr int kModels = 60;
+  const auto name = [](int i) { return "new" + std::to_string(i); };
+  std::atomic<bool> written = false;
+  std::thread writer([&] {
+    for (int i = 0; i < kModels; ++i) {
+      EXPECT_TRUE(
+          store_->PutModel(ModelOf(Key(name(i))), ArraysOf(name(i))).ok());
+    }
+    written = true;
+  });
+  while (!written) EXPECT_EQ(store_->CollectOrphans().value(), 0);
+  writer.join();
+  for (int i = 0; i < kModels; ++i) {
+    EXPECT_EQ(TextOf(store_->ModelArrays(Key(name(i))).value()), name(i));
   }
 }
 

@@ -65,7 +65,7 @@ class CallRunner {
   std::set<const PeerWait*> waits_ ABSL_GUARDED_BY(mutex_);
 };
 
-// A stream to the peer of a call. Both are borrowed.
+// A stream to the peer of a call. All it is made from is borrowed.
 template <typename Message>
 class PeerWriter {
  public:
@@ -86,7 +86,7 @@ class PeerWriter {
   grpc::ServerWriter<Message>& writer_;
 };
 
-// A stream from the peer of a call. Both are borrowed.
+// A stream from the peer of a call. All it is made from is borrowed.
 template <typename Message>
 class PeerReader {
  public:

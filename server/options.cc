@@ -83,6 +83,9 @@ void VisitOptions(SomeOptions& o, Visitor&& visit) {
   visit("stall-timeout", o.stall_timeout, 0.1, 86'400,
         "Seconds after which a stream that takes no message, or a call that "
         "neither sends nor reads, is ended.");
+  visit("resume-grace", o.resume_grace, 0, 86'400,
+        "Seconds for which the place of a participant whose stream broke is "
+        "kept: it comes back with the token that it has.");
   visit("drain-timeout", o.drain_timeout, 0, 86'400,
         "Seconds that SIGTERM leaves to what is running.");
 }

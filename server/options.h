@@ -55,6 +55,7 @@ struct Options {
   int max_participants = 64;
 
   Seconds stall_timeout{10};
+  Seconds resume_grace{60};
   Seconds drain_timeout{10};
 };
 

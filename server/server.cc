@@ -71,6 +71,7 @@ SessionEnvironment EnvironmentOf(const Options& options,
           .clock = [] { return std::chrono::steady_clock::now(); },
           .max_participants = options.max_participants,
           .stall_timeout = options.stall_timeout.milliseconds(),
+          .resume_grace = options.resume_grace.milliseconds(),
           .report = [](const absl::Status& status) { Warn(status); }};
 }
 

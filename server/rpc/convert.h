@@ -63,6 +63,16 @@ struct JoinRequest {
 // BAD_NAME, UNKNOWN_VALUE (delivery), UNKNOWN_ENCODING.
 absl::StatusOr<JoinRequest> FromProto(const v1::Join& join);
 
+// As far as its shape goes: BAD_TOKEN (longer than 64 bytes), UNKNOWN_VALUE
+// (role).
+absl::StatusOr<Introduction> IntroductionOf(const v1::Join& join);
+// INDEX_OUT_OF_RANGE beyond 2^31; Roster checks the rest.
+absl::StatusOr<Shown> FromProto(const v1::Presence& presence);
+absl::StatusOr<std::vector<int32_t>> ToHandles(
+    const google::protobuf::RepeatedField<uint32_t>& vertices,
+    absl::string_view field);
+PoseTerms TermsOf(const v1::Pose& pose);
+
 void ToProto(const ModelRecord& record, v1::Model* model);
 // In full, or without the lists that grow with the model.
 enum class Detail { kFull, kSummary };
@@ -74,5 +84,10 @@ void ToProto(const SessionState& state, v1::Session* session);
 void ToProto(const CoordinateScheme& scheme, v1::Scheme* out);
 void ToProto(const Session::Joined& joined, v1::Joined* out);
 void ToProto(const RigChange& change, v1::RigChanged* out);
+void ToProto(const Rejection& rejection, v1::PoseRejected* out);
+void ToProto(const Acknowledgement& acknowledgement, v1::Acknowledged* out);
+// `now` is of the sessions' clock: locks tell how long they last.
+void ToProto(const PresenceChange& change,
+             std::chrono::steady_clock::time_point now, v1::Participants* out);
 
 }  // namespace deform::server

@@ -63,6 +63,10 @@ void ToProto(const Session::Joined& joined, v1::Joined* out) {
   AddRows(joined.pose.vertices.topRows(rows), binding.dimension(),
           out->mutable_pose());
   out->set_stretch_blend(joined.pose.stretch_blend);
+  out->set_participant_id(joined.participant_id);
+  out->set_resume_token(joined.token);
+  out->set_resumed(joined.resumed);
+  out->set_last_sequence(joined.last_sequence);
 }
 
 void ToProto(const RigChange& change, v1::RigChanged* out) {

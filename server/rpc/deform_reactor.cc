@@ -88,13 +88,13 @@ void DeformReactor::HandleMessage(const v1::DeformRequest& request) {
     HandleJoin(request.join());
   } else if (request.has_pose() && joined) {
     HandlePose(request.pose());
-  } else if (request.has_keyframe() && joined) {
-    participant()->WantKeyframe();
+  } else if (joined && HandleRequest(*participant(), request)) {
+    return;
   } else {
     MutexLock lock(mutex_);
-    End(joined ? InvalidInput("POSE_EXPECTED", "pose",
-                              "after joining, a stream has poses and requests "
-                              "for keyframes")
+    End(joined ? InvalidInput("POSE_EXPECTED", "message",
+                              "after joining, a stream has poses and the like: "
+                              "it cannot join again, or say nothing")
                : InvalidInput("JOIN_FIRST", "join",
                               "the first message of a stream is join"));
   }
@@ -106,9 +106,10 @@ void DeformReactor::HandleJoin(const v1::Join& join) {
     DEFORM_ASSIGN_OR_RETURN(const auto session,
                             streams_.sessions_.catalogue().Find(
                                 request.tenant, request.session_id));
+    DEFORM_ASSIGN_OR_RETURN(const Introduction who, IntroductionOf(join));
     DEFORM_ASSIGN_OR_RETURN(
         Session::Joined joined,
-        session->Join(request.delivery, request.frames, weak_from_this()));
+        session->Join(request.delivery, request.frames, weak_from_this(), who));
     v1::Joined message;
     ToProto(joined, &message);
     MutexLock lock(mutex_);
@@ -131,10 +132,44 @@ void DeformReactor::HandlePose(const v1::Pose& pose) {
   Participant& participant = *this->participant();
   const bool accepted = participant.Submit(
       pose.sequence(), FromProto(pose, participant.session().dimension()),
-      pose.rig_changes());
+      TermsOf(pose));
   streams_.counters_.CountPose(accepted);
   MutexLock lock(mutex_);
   ++poses_;
+}
+
+bool DeformReactor::HandleRequest(Participant& participant,
+                                  const v1::DeformRequest& request) {
+  switch (request.message_case()) {
+    case v1::DeformRequest::kKeyframe:
+      participant.WantKeyframe();
+      return true;
+    case v1::DeformRequest::kLock:
+      participant.Lock(request.lock().sequence(),
+                       ToHandles(request.lock().vertices(), "lock.vertices"),
+                       std::chrono::milliseconds(request.lock().lease_ms()),
+                       request.lock().rig_changes());
+      return true;
+    case v1::DeformRequest::kUnlock:
+      participant.Unlock(
+          request.unlock().sequence(),
+          ToHandles(request.unlock().vertices(), "unlock.vertices"),
+          request.unlock().rig_changes());
+      return true;
+    case v1::DeformRequest::kPresence:
+      participant.Show(FromProto(request.presence()));
+      return true;
+    case v1::DeformRequest::kUndo:
+      participant.Reverse(request.undo().sequence(),
+                          EditHistory::Direction::kUndo);
+      return true;
+    case v1::DeformRequest::kRedo:
+      participant.Reverse(request.redo().sequence(),
+                          EditHistory::Direction::kRedo);
+      return true;
+    default:
+      return false;
+  }
 }
 
 Participant* DeformReactor::participant() const {
@@ -194,9 +229,16 @@ void DeformReactor::StartNextWrite() {
     Write(response);
   } else if (auto* rejection = std::get_if<Rejection>(&*next)) {
     v1::DeformResponse response;
-    response.mutable_rejected()->set_sequence(rejection->sequence);
-    *response.mutable_rejected()->mutable_status() =
-        ToRpcStatus(rejection->status);
+    ToProto(*rejection, response.mutable_rejected());
+    Write(response);
+  } else if (auto* done = std::get_if<Acknowledgement>(&*next)) {
+    v1::DeformResponse response;
+    ToProto(*done, response.mutable_acknowledged());
+    Write(response);
+  } else if (auto* presence = std::get_if<PresenceChange>(&*next)) {
+    v1::DeformResponse response;
+    ToProto(*presence, streams_.sessions_.clock()(),
+            response.mutable_participants());
     Write(response);
   } else {
     End(std::get<Ended>(*next).status);
@@ -263,7 +305,11 @@ void DeformReactor::CheckStall(TimePoint now) {
                   {.reason = "JOIN_TIMEOUT", .field = "join"}));
   } else if (participant_ != nullptr) {
     const absl::Status status = participant_->CheckStall();
-    if (!status.ok()) End(status);
+    if (!status.ok()) {
+      End(status);
+    } else {
+      Advance();  // Others may have shown something meanwhile.
+    }
   }
 }
 
@@ -278,6 +324,10 @@ void DeformReactor::OnDone() {
     }
     status = *finished_;
     done_ = true;
+    // It went as it wanted to, and knows: nobody will come back.
+    if (participant_ != nullptr && status.ok() && !context_->IsCancelled()) {
+      participant_->Forget();
+    }
   }
   LogCall(call, context_->peer(), status,
           streams_.sessions_.clock()() - begin_);

@@ -87,6 +87,9 @@ class DeformReactor final
   void HandleMessage(const v1::DeformRequest& request);
   void HandleJoin(const v1::Join& join);
   void HandlePose(const v1::Pose& pose);
+  // All others that may follow; false if it is none of them.
+  static bool HandleRequest(Participant& participant,
+                            const v1::DeformRequest& request);
 
   Participant* participant() const;
   // Starts what can be started: a read, a write, the end.

@@ -18,10 +18,15 @@ bool Audience::Seat::MustSeeThis() const {
 }
 
 int64_t Audience::Add(Delivery delivery, const FrameFormat& format,
-                      std::weak_ptr<Receiver> receiver) {
+                      std::weak_ptr<Receiver> receiver, const Rejoining& from) {
   Seat seat{.outbox = Outbox(delivery),
             .format = format,
             .receiver = std::move(receiver)};
+  seat.contained = from.contained;
+  seat.outbox.Expect(from.last_pose);
+  if (from.revision) seat.outbox.GoOnFrom(*from.revision);
+  for (const auto& change : from.changes) seat.outbox.Announce(change);
+  for (const Notice& notice : from.notices) seat.outbox.Notify(notice);
   Serve(seat);
   const int64_t number = next_seat_++;
   seats_.emplace(number, std::move(seat));
@@ -136,6 +141,15 @@ std::optional<Audience::TimePoint> Audience::WaitingSince(int64_t seat) const {
 Audience::Receivers Audience::receivers() const {
   Receivers receivers;
   for (const auto& [number, seat] : seats_) receivers.push_back(seat.receiver);
+  return receivers;
+}
+
+Audience::Receivers Audience::receivers(std::span<const int64_t> seats) const {
+  Receivers receivers;
+  for (const int64_t number : seats) {
+    const auto found = seats_.find(number);
+    if (found != seats_.end()) receivers.push_back(found->second.receiver);
+  }
   return receivers;
 }
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -26,6 +27,17 @@ class Receiver {
   virtual void Wake() = 0;
 };
 
+// Where somebody goes on who was here before, on another stream.
+struct Rejoining {
+  uint64_t last_pose = 0;  // Frames are to answer up to this one.
+  uint64_t contained = 0;  // Of them, what the present revision contains.
+  // The last that it received; none if it received none.
+  std::optional<uint64_t> revision;
+  // Of the rig, that it was not told of. No more than an outbox takes.
+  std::vector<std::shared_ptr<const RigChange>> changes;
+  std::vector<Notice> notices;  // Again: they may be lost.
+};
+
 // A receiver holds one revision on a grid: the last that it was offered, since
 // streams lose nothing. So a frame that refers to another may not be replaced
 // in the outbox: with delivery LATEST such a seat is offered one only when
@@ -41,7 +53,9 @@ class Audience {
   // Gives a seat, which gets a frame of the present revision: at once if there
   // is one, else it needs one.
   int64_t Add(Delivery delivery, const FrameFormat& format,
-              std::weak_ptr<Receiver> receiver);
+              std::weak_ptr<Receiver> receiver, const Rejoining& from = {});
+  // Of whom is added next.
+  int64_t next_seat() const { return next_seat_; }
   void Remove(int64_t seat) { seats_.erase(seat); }
   int size() const { return static_cast<int>(seats_.size()); }
   // Null if there is none. Its frames come by Publish() and go by Take().
@@ -81,6 +95,7 @@ class Audience {
   std::optional<TimePoint> WaitingSince(int64_t seat) const;
 
   Receivers receivers() const;
+  Receivers receivers(std::span<const int64_t> seats) const;
 
  private:
   struct Seat {

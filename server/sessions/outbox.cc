@@ -33,8 +33,17 @@ bool Outbox::full() const {
 }
 
 void Outbox::Reject(uint64_t sequence, absl::Status status) {
-  assert(has_room_for_rejections());
-  rejections_.push_back({sequence, std::move(status)});
+  Notify(Rejection{.sequence = sequence, .status = std::move(status)});
+}
+
+void Outbox::Notify(Notice notice) {
+  assert(has_room_for_notices());
+  notices_.push_back(std::move(notice));
+}
+
+void Outbox::GoOnFrom(uint64_t revision) {
+  revision_ = revision;
+  goes_on_ = true;
 }
 
 void Outbox::EndWhenAnswered(absl::Status status) {
@@ -43,7 +52,7 @@ void Outbox::EndWhenAnswered(absl::Status status) {
 
 void Outbox::EndNow(absl::Status status) {
   frames_.clear();
-  rejections_.clear();
+  notices_.clear();
   end_ = std::move(status);
   sent_any_ = true;
   answered_ = expected_;
@@ -51,10 +60,10 @@ void Outbox::EndNow(absl::Status status) {
 
 std::optional<Outgoing> Outbox::Take() {
   if (ended_) return std::nullopt;
-  if (!rejections_.empty()) {
-    Rejection rejection = std::move(rejections_.front());
-    rejections_.pop_front();
-    return rejection;
+  if (!notices_.empty()) {
+    const Notice notice = std::move(notices_.front());
+    notices_.pop_front();
+    return std::visit([](auto& any) { return Outgoing(any); }, notice);
   }
   if (end_ && Answered()) {
     ended_ = true;
@@ -80,7 +89,7 @@ FrameToSend Outbox::TakeFrame() {
   const FrameInfo& info = waiting.frame->info;
   FrameToSend send{.frame = waiting.frame, .answers_sequence = waiting.answers};
   // The same revision comes again to who asked for a keyframe.
-  if (sent_any_ && info.revision > revision_) {
+  if ((sent_any_ || goes_on_) && info.revision > revision_) {
     send.skipped_revisions = info.revision - revision_ - 1;
   }
   send.tells_origin = !sent_any_ || info.origin_number != origin_number_;

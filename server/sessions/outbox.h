@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "core/deform/pose.h"
 #include "server/sessions/frame.h"
+#include "server/sessions/presence.h"
 #include "server/sessions/rig_change.h"
 
 namespace deform::server {
@@ -40,19 +42,34 @@ struct RigChanged {
 struct Rejection {
   uint64_t sequence = 0;
   absl::Status status;
+  // With a conflict: what there is to merge with, as of when it is taken.
+  struct Current {
+    uint64_t revision = 0;
+    int dimension = 3;
+    Pose pose;
+  };
+  std::optional<Current> current;
 };
+// A request that no frame answers, or not in full, was carried out.
+struct Acknowledgement {
+  uint64_t sequence = 0;
+  uint64_t edit = 0;  // That was undone or redone.
+  std::vector<int32_t> left_out;
+};
+// The participant's answers, in order.
+using Notice = std::variant<Rejection, Acknowledgement>;
 // The stream ends; OK: because the participant has finished.
 struct Ended {
   absl::Status status;
 };
-using Outgoing =
-    std::variant<FrameToSend, OrderToSend, RigChanged, Rejection, Ended>;
+using Outgoing = std::variant<FrameToSend, OrderToSend, RigChanged, Rejection,
+                              Acknowledgement, PresenceChange, Ended>;
 
-// Not thread-safe; never holds more than a few frames and rejections.
+// Not thread-safe; never holds more than a few frames and notices.
 class Outbox {
  public:
   static constexpr size_t kMaxFrames = 4;
-  static constexpr size_t kMaxRejections = 16;
+  static constexpr size_t kMaxNotices = 16;
   static constexpr size_t kMaxRigChanges = 4;
 
   explicit Outbox(Delivery delivery) : delivery_(delivery) {}
@@ -73,11 +90,14 @@ class Outbox {
 
   // The pose `sequence` was accepted: a frame will answer it.
   void Expect(uint64_t sequence) { expected_ = sequence; }
-  // Needs room for rejections.
+  // Need room for notices.
   void Reject(uint64_t sequence, absl::Status status);
-  bool has_room_for_rejections() const {
-    return rejections_.size() < kMaxRejections;
-  }
+  void Notify(Notice notice);
+  bool has_room_for_notices() const { return notices_.size() < kMaxNotices; }
+
+  // The participant was here before and has frames up to this revision, from
+  // another stream.
+  void GoOnFrom(uint64_t revision);
 
   // Ends with `status` after what was asked so far is answered. The first of
   // these calls decides.
@@ -102,7 +122,7 @@ class Outbox {
   const Delivery delivery_;
   std::deque<Waiting> frames_;
   RigChanges announced_;  // Since the last frame.
-  std::deque<Rejection> rejections_;
+  std::deque<Notice> notices_;
   std::optional<absl::Status> end_;
   bool ended_ = false;
 
@@ -113,6 +133,7 @@ class Outbox {
   uint64_t origin_number_ = 0;
   bool sent_any_ = false;
   bool sent_order_ = false;
+  bool goes_on_ = false;
 };
 
 }  // namespace deform::server

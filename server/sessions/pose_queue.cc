@@ -8,9 +8,8 @@ namespace deform::server {
 void PoseQueue::Push(const Answer& answer, const PoseUpdate& update,
                      bool own_revision) {
   if (own_revision || steps_.empty() || steps_.back().own_revision) {
-    const Pose& before = steps_.empty() ? pose_ : steps_.back().pose;
     steps_.push_back(
-        {.pose = before, .answers = {}, .own_revision = own_revision});
+        {.pose = newest(), .answers = {}, .own_revision = own_revision});
   }
   Step& step = steps_.back();
   ApplyPoseUpdate(update, step.pose);
@@ -21,7 +20,7 @@ void PoseQueue::Push(const Answer& answer, const PoseUpdate& update,
   if (answered == step.answers.end()) {
     step.answers.push_back(answer);
   } else {
-    answered->sequence = answer.sequence;
+    *answered = answer;
   }
 }
 

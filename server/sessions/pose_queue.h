@@ -21,6 +21,7 @@ class PoseQueue {
   struct Answer {
     int64_t participant = 0;
     uint64_t sequence = 0;
+    uint64_t write = 0;  // Its number in the WriteLog.
   };
   struct Step {
     Pose pose;                    // Where the rig is after this step.
@@ -39,6 +40,11 @@ class PoseQueue {
 
   // The rig has changed: what waits goes on with the new one.
   void Transfer(const PoseTransfer& transfer);
+
+  // Where the rig will be after all steps.
+  const Pose& newest() const {
+    return steps_.empty() ? pose_ : steps_.back().pose;
+  }
 
   void Clear() { steps_.clear(); }
   bool empty() const { return steps_.empty(); }

@@ -34,6 +34,7 @@ absl::Status Presence::Check(const Shown& shown, int64_t rows) {
 }
 
 void Presence::Enter(Attendee attendee) {
+  if (entries_.size() >= kMaxAttendees) return;
   const int64_t id = attendee.id;
   entries_[id] = {.attendee = std::move(attendee), .changed = ++version_};
 }

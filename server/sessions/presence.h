@@ -46,6 +46,8 @@ struct PresenceChange {
 // queue. Not thread-safe.
 class Presence {
  public:
+  // Who comes when so many are shown is not shown.
+  static constexpr size_t kMaxAttendees = 256;
   static constexpr size_t kMaxCursorBytes = 256;
   static constexpr size_t kMaxGrabbed = 256;
   static constexpr size_t kMaxNameBytes = 64;

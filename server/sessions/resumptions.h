@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <string>
@@ -10,6 +11,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "server/sessions/edit_history.h"
+#include "server/sessions/outbox.h"
 
 namespace deform::server {
 
@@ -26,9 +28,11 @@ std::string ResumeKeyOf(absl::string_view token);
 struct Place {
   int64_t participant = 0;
   uint64_t last_sequence = 0;  // Of what was accepted.
+  uint64_t last_pose = 0;      // Of that, what a frame will answer.
   uint64_t contained = 0;      // Of what the present revision contains.
   uint64_t first_change = 0;   // Changes of the rig before it joined.
   EditHistory history;
+  std::deque<Notice> notices;  // The last of them.
 };
 
 // Places by key. Each is kept for the grace time, and no more than a number of

@@ -14,6 +14,13 @@ void RigHistory::Add(std::shared_ptr<const RigChange> change) {
   if (changes_.size() > kMaxChanges) changes_.pop_front();
 }
 
+std::optional<std::vector<std::shared_ptr<const RigChange>>> RigHistory::Last(
+    uint64_t number) const {
+  if (number > changes_.size()) return std::nullopt;
+  return std::vector<std::shared_ptr<const RigChange>>(
+      changes_.end() - static_cast<int64_t>(number), changes_.end());
+}
+
 absl::StatusOr<PoseUpdate> RigHistory::TakeOver(PoseUpdate update,
                                                 uint64_t changes) const {
   if (changes > changes_.size()) {

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "core/deform/pose.h"
@@ -21,6 +23,9 @@ class RigHistory {
   void Add(std::shared_ptr<const RigChange> change);
   // All changes there were.
   uint64_t count() const { return count_; }
+  // The last `number` of them, oldest first; none if not so many are known.
+  std::optional<std::vector<std::shared_ptr<const RigChange>>> Last(
+      uint64_t number) const;
 
   // `update` as it is for the present rig; it was made for the rig as it was
   // `changes` changes ago, of at most count(). InvalidArgument RIG_CHANGED (too

@@ -51,7 +51,10 @@ Session::Session(StoredStart start, BindingInUse use,
       revision_(start.at.revision),
       pose_(std::move(start.at.pose)),
       journal_(environment.store, {tenant_, id_}, start.at.epoch,
-               start.at.revision, environment.report) {
+               start.at.revision, environment.report),
+      roster_(PoseRows(facts().rig()), environment.max_participants,
+              environment.resume_grace) {
+  roster_.Restore(start.at.answers, environment_.clock());
   if (weights_ != nullptr) {
     deformer_ =
         std::make_unique<Deformer>(weights_, nullptr, *environment_.drags);
@@ -89,28 +92,6 @@ SessionState Session::StateLocked() const {
           .epoch = epoch(),
           .participants = audience_.size(),
           .create_time = create_time_};
-}
-
-absl::StatusOr<Session::Joined> Session::Join(
-    Delivery delivery, const FrameWishes& wishes,
-    std::weak_ptr<Receiver> receiver) {
-  MutexLock lock(mutex_);
-  if (closed_) return *closed_;
-  if (audience_.size() >= environment_.max_participants) {
-    return MakeError(
-        absl::StatusCode::kResourceExhausted,
-        absl::StrCat("the session has ", audience_.size(),
-                     " participants, its limit (max-participants)"),
-        {.reason = "TOO_MANY_PARTICIPANTS", .field = "max-participants"});
-  }
-  DEFORM_ASSIGN_OR_RETURN(const FrameFormat format,
-                          PickFormat(wishes, facts().rig()));
-  const int64_t seat = audience_.Add(delivery, format, std::move(receiver));
-  senders_[seat] = {.first_change = rig_history_.count()};
-  Schedule();
-  return Joined{
-      std::unique_ptr<Participant>(new Participant(shared_from_this(), seat)),
-      format, StateLocked(), facts(), pose_};
 }
 
 void Session::Move(RigMove move) {
@@ -298,8 +279,10 @@ Session::Receivers Session::Publish(Step& step, Frames frames) {
   if (step.change != nullptr) PublishChange(step);
   if (step.pose) {
     before = std::exchange(pose_, std::move(step.pose->pose));
+    roster_.Published(info_.revision, step.pose->answers);
     for (const PoseQueue::Answer& answer : step.pose->answers) {
-      audience_.Contain(answer.participant, answer.sequence);
+      const auto seat = roster_.SeatOf(answer.participant);
+      if (seat) audience_.Contain(*seat, answer.sequence);
     }
   }
   const bool newer = revision_ != info_.revision;
@@ -320,31 +303,8 @@ void Session::PublishChange(Step& step) {
   binding_id_ = step.change->binding_id;
   weights_ = std::move(step.move->to.binding);
   rig_history_.Add(step.change);
+  roster_.Transfer(step.change->transfer, environment_.clock());
   audience_.Announce(step.change);
-}
-
-absl::StatusOr<PoseUpdate> Session::CheckPose(
-    const Sender& sender, uint64_t sequence,
-    const absl::StatusOr<PoseUpdate>& update, uint64_t rig_changes) const {
-  if (sequence <= sender.last_sequence) {
-    return InvalidInput(
-        "SEQUENCE_NOT_RISING", "pose.sequence",
-        absl::StrCat("pose ", sequence, " comes after pose ",
-                     sender.last_sequence, "; sequences rise from 1"));
-  }
-  if (!update.ok()) return update.status();
-  const uint64_t changes = rig_history_.count() - sender.first_change;
-  if (rig_changes > changes) {
-    return InvalidInput(
-        "RIG_UNKNOWN", "pose.rig_changes",
-        absl::StrCat("pose.rig_changes is ", rig_changes,
-                     ", but this stream was told of ", changes));
-  }
-  if (rig_changes < changes) {
-    return rig_history_.TakeOver(*update, changes - rig_changes);
-  }
-  DEFORM_RETURN_IF_ERROR(CheckPoseUpdate(*update, facts().rig()));
-  return *update;
 }
 
 }  // namespace deform::server

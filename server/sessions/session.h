@@ -31,6 +31,7 @@
 #include "server/sessions/pose_queue.h"
 #include "server/sessions/rig_change.h"
 #include "server/sessions/rig_history.h"
+#include "server/sessions/roster.h"
 #include "server/sessions/session_journal.h"
 
 namespace deform::server {
@@ -48,6 +49,8 @@ struct SessionEnvironment {
   int max_participants = 64;
   // How long a receiver may take to send one message.
   std::chrono::milliseconds stall_timeout{10000};
+  // How long the place of a broken stream is kept.
+  std::chrono::milliseconds resume_grace{60000};
   std::shared_ptr<PointOrders> point_orders = std::make_shared<PointOrders>();
   JournalReport report = {};  // May be empty.
   // What the manager adds. The store of all sessions; null: they are not kept.
@@ -118,12 +121,19 @@ class Session : public std::enable_shared_from_this<Session> {
     SessionState state;
     BindingFacts binding;
     Pose pose;
+    int64_t participant_id = 0;  // The same over all its streams.
+    std::string token;           // To come back with.
+    bool resumed = false;        // The token was known.
+    uint64_t last_sequence = 0;  // Of what was accepted from it.
   };
-  // A frame of the present state follows. ResourceExhausted
-  // TOO_MANY_PARTICIPANTS; what PickFormat() refuses; after End() or Drain()
-  // their status.
+  // A frame of the present state follows. Who comes back by a token goes on
+  // where it was; a stream that still has its place ends Aborted TAKEN_OVER.
+  // ResourceExhausted TOO_MANY_PARTICIPANTS; FailedPrecondition RIG_CHANGED
+  // (too often since); what PickFormat() and Roster refuse; after End() or
+  // Drain() their status.
   absl::StatusOr<Joined> Join(Delivery delivery, const FrameWishes& wishes,
-                              std::weak_ptr<Receiver> receiver);
+                              std::weak_ptr<Receiver> receiver,
+                              const Introduction& who = {});
 
   // Moves to the binding of edited handles, as a revision of its own, before
   // the poses that wait: these are taken over. Participants are told before the
@@ -176,12 +186,6 @@ class Session : public std::enable_shared_from_this<Session> {
   friend class Participant;
   using Receivers = Audience::Receivers;
 
-  // What is known of who sends poses from a seat of the audience.
-  struct Sender {
-    uint64_t first_change = 0;   // Changes of the rig before it joined.
-    uint64_t last_sequence = 0;  // Of the poses accepted.
-  };
-
   // `binding` may be null in `use`.
   Session(StoredStart start, BindingInUse use, MemoryBudget::Reservation memory,
           const SessionEnvironment& environment);
@@ -191,14 +195,34 @@ class Session : public std::enable_shared_from_this<Session> {
     return lease_.record()->facts;
   }
   SessionState StateLocked() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // The place that was taken, if there was one, and what has changed since.
+  absl::StatusOr<Rejoining> Welcome(const Roster::Member& member,
+                                    const Introduction& who) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Ends the stream in this seat; its member has left.
+  void Dismiss(int64_t seat) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Changes of the rig since the member joined.
+  uint64_t RigChangesFor(const Roster::Member& member) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // The update as it is for the present rig.
-  absl::StatusOr<PoseUpdate> CheckPose(const Sender& sender, uint64_t sequence,
+  absl::StatusOr<PoseUpdate> CheckPose(const Roster::Member& member,
+                                       uint64_t sequence,
                                        const absl::StatusOr<PoseUpdate>& update,
-                                       uint64_t rig_changes) const
+                                       const PoseTerms& terms) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // InvalidArgument RIG_CHANGED unless the member knows the present rig.
+  absl::Status CheckIsOfRig(const Roster::Member& member,
+                            uint64_t rig_changes) const
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // What moves the rig: `write` is its number in the roster.
+  void Accept(Roster::Member& member, Outbox& outbox, uint64_t sequence,
+              const PoseUpdate& update, uint64_t write)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool CanMove() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool CanStep() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Schedule() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // What its stream took last, before it is sent.
+  void Complete(Outgoing& outgoing) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   static void Wake(const Receivers& receivers);
 
   absl::Status ChangeRig(Step& step, ThreadPool* pool);
@@ -242,11 +266,13 @@ class Session : public std::enable_shared_from_this<Session> {
   Pose pose_ ABSL_GUARDED_BY(mutex_);  // Of the revision.
   std::optional<absl::Status> closed_ ABSL_GUARDED_BY(mutex_);
   Audience audience_ ABSL_GUARDED_BY(mutex_);
-  std::map<int64_t, Sender> senders_ ABSL_GUARDED_BY(mutex_);  // By seat.
   // Appends are made with the lock held; none waits for a disk.
   SessionJournal journal_;
   // Set if the session has become another server's.
   std::optional<absl::Status> lost_ ABSL_GUARDED_BY(mutex_);
+  Roster roster_ ABSL_GUARDED_BY(mutex_);
+  // Seats whose streams are to end, with the reason.
+  std::map<int64_t, absl::Status> dismissed_ ABSL_GUARDED_BY(mutex_);
 };
 
 // NotFound SESSION_DELETED.

@@ -67,12 +67,14 @@ void Session::WakeUp(FindWeights find_weights) {
 }
 
 void Session::Journal(const Step& step, const Pose& before) {
-  const absl::Status status =
-      journal_.Append({.number = revision_,
-                       .before = &before,
-                       .now = &pose_,
-                       .binding_id = binding_id_,
-                       .rig_changed = step.change != nullptr});
+  const absl::Status status = journal_.Append(
+      {.number = revision_,
+       .before = &before,
+       .now = &pose_,
+       .binding_id = binding_id_,
+       .rig_changed = step.change != nullptr,
+       .answers = environment_.store == nullptr ? AnsweredSequences()
+                                                : roster_.Answers()});
   if (!status.ok()) lost_ = status;
 }
 

@@ -42,6 +42,27 @@ void CheckPose(const v1::Pose& message, const Rig& rig) {
   FUZZ_EXPECT(pose.stretch_blend >= 0 && pose.stretch_blend <= 1);
 }
 
+void CheckIntroduction(const v1::Join& message) {
+  const auto who = IntroductionOf(message);
+  if (!who.ok()) return CheckRefusal(who.status());
+  FUZZ_EXPECT(who->token.size() <= 64);
+  const absl::Status status = Presence::CheckName(who->name);
+  if (!status.ok()) CheckRefusal(status);
+}
+
+void CheckPresence(const v1::Presence& message) {
+  const auto shown = FromProto(message);
+  if (!shown.ok()) return CheckRefusal(shown.status());
+  const absl::Status status = Presence::Check(*shown, PoseRows(CubeRig()));
+  if (!status.ok()) CheckRefusal(status);
+}
+
+void CheckLock(const v1::LockHandles& message) {
+  const auto handles = ToHandles(message.vertices(), "lock.vertices");
+  if (!handles.ok()) return CheckRefusal(handles.status());
+  for (const int32_t handle : *handles) FUZZ_EXPECT(handle >= 0);
+}
+
 void CheckJoin(const v1::Join& message) {
   const auto join = FromProto(message);
   if (!join.ok()) return CheckRefusal(join.status());
@@ -59,6 +80,9 @@ void Check(const uint8_t* data, size_t size) {
   CheckPose(request.pose(), CubeRig());
   CheckPose(request.pose(), SquareRig());
   CheckJoin(request.join());
+  CheckIntroduction(request.join());
+  CheckPresence(request.presence());
+  CheckLock(request.lock());
 }
 
 }  // namespace

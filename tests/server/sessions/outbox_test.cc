@@ -139,13 +139,13 @@ TEST(Outbox, SendsRejectionsBeforeFrames) {
 
 TEST(Outbox, HasRoomForAFewRejections) {
   Outbox outbox(Delivery::kLatest);
-  for (size_t i = 0; i < Outbox::kMaxRejections; ++i) {
-    EXPECT_TRUE(outbox.has_room_for_rejections());
+  for (size_t i = 0; i < Outbox::kMaxNotices; ++i) {
+    EXPECT_TRUE(outbox.has_room_for_notices());
     outbox.Reject(i, absl::InvalidArgumentError("bad"));
   }
-  EXPECT_FALSE(outbox.has_room_for_rejections());
+  EXPECT_FALSE(outbox.has_room_for_notices());
   outbox.Take();
-  EXPECT_TRUE(outbox.has_room_for_rejections());
+  EXPECT_TRUE(outbox.has_room_for_notices());
 }
 
 TEST(Outbox, EndsWhenTheLastPoseIsAnswered) {

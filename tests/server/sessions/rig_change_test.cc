@@ -186,13 +186,13 @@ TEST_F(RigChangeTest, TakesPosesInFlightOverToTheNewRig) {
   // Sent before the change was read: all nine handles as they were.
   Positions whole = FirstHandles().positions();
   whole.rowwise() += Eigen::RowVector3d(0.5, 0, 0);
-  stream.participant->Submit(1, PoseUpdate{.positions = whole}, 0);
+  stream.participant->Submit(1, PoseUpdate{.positions = whole}, {0});
   executor_.RunAll();
   const Pose pose = PoseOfSession();
   EXPECT_EQ(pose.vertices.topRows(8), whole.bottomRows(8));
   EXPECT_EQ(pose.vertices.row(8), Eigen::RowVector3d(0, 0.2, 0.3));
   // And after it was read: the new row.
-  stream.participant->Submit(2, MoveVertex(8, {0, 0, 0.4}), 1);
+  stream.participant->Submit(2, MoveVertex(8, {0, 0, 0.4}), {1});
   executor_.RunAll();
   EXPECT_EQ(PoseOfSession().vertices.row(8), Eigen::RowVector3d(0, 0, 0.4));
 }
@@ -204,7 +204,7 @@ TEST_F(RigChangeTest, NeverAppliesAPoseToAnotherHandle) {
   TakeChange(stream);
   stream.TakeFrame();
   // Row 8 is the new handle now.
-  stream.participant->Submit(1, MoveVertex(8, {0.3, 0.1, 0.2}), 0);
+  stream.participant->Submit(1, MoveVertex(8, {0.3, 0.1, 0.2}), {0});
   const auto rejection =
       std::get<Rejection>(stream.participant->Take().value());
   EXPECT_EQ(DetailOf(rejection.status).reason, "RIG_CHANGED");
@@ -220,7 +220,7 @@ TEST_F(RigChangeTest, RefusesPosesThatFitNoRigClearly) {
   TakeChange(stream);
   stream.TakeFrame();
   const PoseUpdate ten{.positions = Positions::Ones(10, 3)};
-  stream.participant->Submit(1, ten, 0);
+  stream.participant->Submit(1, ten, {0});
   absl::Status status =
       std::get<Rejection>(stream.participant->Take().value()).status;
   EXPECT_EQ(DetailOf(status).reason, "WRONG_LENGTH");
@@ -228,12 +228,12 @@ TEST_F(RigChangeTest, RefusesPosesThatFitNoRigClearly) {
             "the rig has changed, and this pose is not for the new one "
             "(rig_changes): pose has 10 positions, but the rig has 9 "
             "vertices");
-  stream.participant->Submit(2, ten, 2);
+  stream.participant->Submit(2, ten, {2});
   status = std::get<Rejection>(stream.participant->Take().value()).status;
   EXPECT_EQ(DetailOf(status).reason, "RIG_UNKNOWN");
   EXPECT_EQ(status.message(),
             "pose.rig_changes is 2, but this stream was told of 1");
-  stream.participant->Submit(3, ten, 1);
+  stream.participant->Submit(3, ten, {1});
   executor_.RunAll();
   EXPECT_EQ(stream.TakeFrame().answers_sequence, 3u);
 }
@@ -243,8 +243,7 @@ TEST_F(RigChangeTest, CountsChangesFromJoiningOn) {
   executor_.RunAll();
   FakeStream late = JoinAndSee();
   EXPECT_EQ(late.pose.vertices.rows(), 10);
-  late.participant->Submit(1, PoseUpdate{.positions = Positions::Ones(10, 3)},
-                           0);
+  late.participant->Submit(1, PoseUpdate{.positions = Positions::Ones(10, 3)});
   executor_.RunAll();
   EXPECT_EQ(late.TakeFrame().answers_sequence, 1u);
 }
@@ -344,12 +343,12 @@ TEST_F(RigChangeTest, TakesPosesOverManyChangesButNotAnyNumber) {
     stream.TakeFrame();
   };
   for (uint64_t i = 0; i < RigHistory::kMaxChanges; ++i) change_once(i);
-  stream.participant->Submit(1, MoveVertex(8, {0.3, 0.1, 0.2}), 0);
+  stream.participant->Submit(1, MoveVertex(8, {0.3, 0.1, 0.2}), {0});
   executor_.RunAll();
   EXPECT_EQ(stream.TakeFrame().answers_sequence, 1u);
   EXPECT_EQ(PoseOfSession().vertices.row(8), Eigen::RowVector3d(0.3, 0.1, 0.2));
   change_once(RigHistory::kMaxChanges);
-  stream.participant->Submit(2, MoveVertex(8, {0.3, 0.1, 0.2}), 0);
+  stream.participant->Submit(2, MoveVertex(8, {0.3, 0.1, 0.2}), {0});
   const absl::Status status =
       std::get<Rejection>(stream.participant->Take().value()).status;
   EXPECT_EQ(DetailOf(status).reason, "RIG_CHANGED");

@@ -100,6 +100,10 @@ struct Client::Impl {
     join.set_delivery(wanted.delivery == Delivery::kEvery
                           ? v1::DELIVERY_EVERY
                           : v1::DELIVERY_LATEST);
+    join.set_role(wanted.role == ParticipantRole::kViewer ? v1::ROLE_VIEWER
+                                                          : v1::ROLE_EDITOR);
+    join.set_name(wanted.name);
+    join.set_presence(wanted.on_participants != nullptr);
     if (wanted.tolerance) join.set_tolerance(*wanted.tolerance);
     if (wanted.tolerance_fraction) {
       join.set_tolerance_fraction(*wanted.tolerance_fraction);
@@ -438,8 +442,10 @@ absl::StatusOr<std::string> Client::Backup(absl::string_view name) {
 
 absl::StatusOr<DeformStream> Client::Deform(absl::string_view session_id,
                                             const DeformOptions& options) {
-  auto stream = std::make_unique<DeformStream::Impl>(*impl_->sessions);
-  DEFORM_RETURN_IF_ERROR(stream->Join(impl_->JoinOf(session_id, options)));
+  auto stream = std::make_unique<DeformStream::Impl>(
+      std::shared_ptr<v1::SessionService::Stub>(impl_, impl_->sessions.get()),
+      impl_->JoinOf(session_id, options), options);
+  DEFORM_RETURN_IF_ERROR(stream->Join());
   return DeformStream(std::move(stream));
 }
 

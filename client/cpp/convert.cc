@@ -372,7 +372,9 @@ absl::StatusOr<JoinedSession> FromProto(const v1::Joined& joined) {
       .dimension = static_cast<int>(joined.dimension()),
       .point_count = static_cast<int64_t>(joined.point_count()),
       .vertex_count = joined.vertex_count(),
-      .revision = joined.session().revision()};
+      .revision = joined.session().revision(),
+      .pose = {},
+      .participant_id = joined.participant_id()};
   DEFORM_ASSIGN_OR_RETURN(result.pose.vertices,
                           ReadRows(joined.pose(), result.dimension));
   if (result.pose.vertices.rows() != result.vertex_count) {

@@ -29,6 +29,11 @@ absl::StatusOr<JoinedSession> FromProto(const v1::Joined& joined);
 absl::StatusOr<RigChange> FromProto(const v1::RigChanged& changed,
                                     int dimension);
 
+ParticipantInfo FromProto(const v1::Participant& participant);
+AcknowledgedRequest FromProto(const v1::Acknowledged& done);
+absl::StatusOr<CurrentPose> FromProto(const v1::CurrentPose& current,
+                                      int dimension);
+
 // Adds to the points of the pose. InvalidArgument (BAD_ANSWER) if the numbers
 // do not fit together.
 absl::Status AddPoints(const v1::QualityPoints& points, QualityInfo& info);

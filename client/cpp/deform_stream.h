@@ -1,14 +1,18 @@
 // One participant's place in a session: poses in, frames out.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include "core/deform/pose.h"
 #include "core/mesh/types.h"
 
@@ -18,6 +22,35 @@ namespace deform {
 enum class Delivery {
   kLatest,  // The newest state whenever there is room; poses may merge.
   kEvery,   // A frame for each pose, in order.
+};
+
+enum class ParticipantRole {
+  kEditor,
+  kViewer,  // Only receives frames: requests are refused.
+};
+
+// Somebody who takes part in a session.
+struct ParticipantInfo {
+  uint64_t id = 0;
+  std::string name;
+  ParticipantRole role = ParticipantRole::kEditor;
+  std::vector<int32_t> grabbed;  // Handles it says it moves.
+  std::string cursor;            // Whatever clients agree upon.
+  std::vector<int32_t> locked;   // Handles that only it may move.
+};
+
+// A request of which frames do not tell all was carried out.
+struct AcknowledgedRequest {
+  uint64_t sequence = 0;
+  uint64_t edit = 0;  // That was undone or redone.
+  // Of its vertices, those that others have written since: they stay.
+  std::vector<int32_t> left_out;
+};
+
+// What to merge with after a conflict.
+struct CurrentPose {
+  uint64_t revision = 0;
+  Pose pose;
 };
 
 // How to join a session. By default frames are exact to float32.
@@ -31,6 +64,29 @@ struct DeformOptions {
   // Frame encodings to choose from, best first (frame.proto). Empty: "float32",
   // or, with a tolerance, whichever takes fewest bytes.
   std::vector<std::string> encodings;
+
+  ParticipantRole role = ParticipantRole::kEditor;
+  std::string name;  // Shown to others; at most 64 bytes.
+  // How long a broken connection is joined again, before the stream ends with
+  // Unavailable RECONNECT_TIMEOUT; 0: it ends at once, for the reason it broke.
+  std::chrono::milliseconds reconnect_for{30000};
+  // Called by NextFrame(), while it waits, when somebody has come, changed or
+  // gone. Without it the server tells nothing of others.
+  std::function<void(const std::vector<ParticipantInfo>&)> on_participants;
+  // Likewise, for locks, undo and redo.
+  std::function<void(const AcknowledgedRequest&)> on_acknowledged;
+};
+
+// What a pose asks for.
+struct PoseOptions {
+  // The rig it is meant for, as in DeformStream::Send().
+  std::optional<uint64_t> rig_changes;
+  // Poses with the same number, one after the other, are one edit that can be
+  // undone, such as a drag. 0: cannot be undone.
+  uint64_t edit = 0;
+  // Refused with Aborted REVISION_CONFLICT if others have written its vertices
+  // after this revision; conflict() tells what there is then.
+  std::optional<uint64_t> base_revision;
 };
 
 // The deformed model of one revision of the session.
@@ -95,10 +151,18 @@ struct JoinedSession {
   int64_t vertex_count = 0;  // Rows of a pose.
   uint64_t revision = 0;
   Pose pose;
+  uint64_t participant_id = 0;  // The same over all connections.
 };
 
 // One thread may send while another receives; neither side may be used by two
 // threads at once. Cancel() may be called from any.
+//
+// If the connection breaks, NextFrame() joins again: the application sees a
+// short stall. What was sent and not answered is kept, up to 4096 requests or
+// 64 MiB, and sent again as far as the server has not accepted it, so that each
+// is carried out once. The place is kept for a while on the server; if it has
+// forgotten it, or was restarted, all that was not answered is sent again.
+// Revisions of that time are skipped, also with Delivery::kEvery.
 //
 // With Delivery::kEvery the server takes a pose only when the frame before has
 // room: who sends many poses before reading blocks in Send() for ever. Keep a
@@ -115,8 +179,10 @@ class DeformStream {
   const JoinedSession& joined() const;
 
   // Sends a pose, whole or in part, and returns its sequence number, counted
-  // from 1. Blocks while the connection is full. An error means that the stream
-  // has ended, and NextFrame() tells why, or that Close() was called.
+  // from 1. Blocks while the connection is full, but not while it is broken. An
+  // error means that the stream has ended, and NextFrame() tells why, that
+  // Close() was called, or ResourceExhausted UNANSWERED_LIMIT: so many wait
+  // that frames must be read first.
   //
   // The pose is meant for the rig as it is after the first `rig_changes`
   // changes; without them, after all that NextFrame() has told. Who sends on a
@@ -124,6 +190,24 @@ class DeformStream {
   // rig is taken over to the present one, handle by handle.
   absl::StatusOr<uint64_t> Send(const PoseUpdate& update);
   absl::StatusOr<uint64_t> Send(const PoseUpdate& update, uint64_t rig_changes);
+
+  absl::StatusOr<uint64_t> Send(const PoseUpdate& update,
+                                const PoseOptions& options);
+
+  // Keeps others from moving these handles, or all that are locked, for a lease
+  // of up to a minute (0: 5 s); locking again extends it. Refused with
+  // FailedPrecondition HANDLE_LOCKED if another has one of them.
+  absl::StatusOr<uint64_t> Lock(std::span<const int32_t> handles,
+                                std::chrono::milliseconds lease = {});
+  // All, if none is named.
+  absl::StatusOr<uint64_t> Unlock(std::span<const int32_t> handles = {});
+  // Takes one's newest edit back, or does it again (session.proto). Answered by
+  // a frame, too. FailedPrecondition NOTHING_TO_UNDO, NOTHING_TO_REDO,
+  // EDIT_OVERWRITTEN.
+  absl::StatusOr<uint64_t> Undo();
+  absl::StatusOr<uint64_t> Redo();
+  // What others are to see: handles one moves, and up to 256 bytes.
+  absl::Status Show(std::span<const int32_t> grabbed, absl::string_view cursor);
 
   // Asks for a frame that refers to no other; it comes without a pose, too.
   // Part of the sending side. Frames need none: it serves those who record
@@ -141,6 +225,12 @@ class DeformStream {
   // How the rig has changed since joining, as of the last frame; part of the
   // receiving side.
   const std::vector<RigChange>& rig_changes() const;
+
+  // Part of the receiving side: who takes part, if on_participants is set; what
+  // came with the last refusal; how often the connection broke and came back.
+  const std::vector<ParticipantInfo>& participants() const;
+  const std::optional<CurrentPose>& conflict() const;
+  int64_t reconnections() const;
 
   uint64_t rejected_sequence() const;
   bool ended() const;

@@ -195,7 +195,11 @@ class Crashes : public testing::Test {
   // Calls of all kinds until one fails: the server is dead then.
   void Live(const std::string& address, Killer& killer) {
     Client client = Client::Connect(address).value();
-    auto stream = client.Deform(kSession, Delivery::kEvery).value();
+    auto stream =
+        client
+            .Deform(kSession, {.delivery = Delivery::kEvery,
+                               .reconnect_for = std::chrono::milliseconds(0)})
+            .value();
     Frame frame;
     while (Change(client, killer) && Pose(stream, frame, killer)) {
     }

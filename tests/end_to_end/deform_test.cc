@@ -390,7 +390,11 @@ TEST(Deform, LeavesWhenTheClientVanishes) {
 TEST(Deform, DrainingAnswersThePosesThatCameAndSaysWhy) {
   RunningServer server;
   const std::string session = server.BallSession();
-  auto stream = server.client().Deform(session, Delivery::kEvery).value();
+  auto stream =
+      server.client()
+          .Deform(session, {.delivery = Delivery::kEvery,
+                            .reconnect_for = std::chrono::milliseconds(0)})
+          .value();
   Frame frame;
   ASSERT_TRUE(stream.NextFrame(frame).ok());
   stream.Send(MovedBy({1, 0, 0})).value();

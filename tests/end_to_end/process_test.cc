@@ -46,7 +46,9 @@ TEST(Deformd, DrainsAndExitsWith0OnSigterm) {
   Client client = Client::Connect(daemon.address()).value();
   const BindingInfo binding = RunningServer::BindBall(client);
   auto stream =
-      client.Deform(client.CreateSession(binding.binding_id)->session_id)
+      client
+          .Deform(client.CreateSession(binding.binding_id)->session_id,
+                  {.reconnect_for = std::chrono::milliseconds(0)})
           .value();
   Frame frame;
   ASSERT_TRUE(stream.NextFrame(frame).ok());

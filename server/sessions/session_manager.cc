@@ -121,33 +121,58 @@ absl::Status SessionManager::Insert(const std::string& tenant,
 absl::StatusOr<Losses> SessionManager::Load(
     const std::vector<StoredSession>& sessions) {
   Losses losses;
-  for (const StoredSession& session : sessions) {
-    const auto& [tenant, id] = session.key;
-    const absl::Status status = LoadOne(session);
+  const auto keep_or_lose = [&](const StoreKey& key,
+                                const absl::Status& status) -> absl::Status {
     if (absl::IsDataLoss(status) || absl::IsNotFound(status)) {
-      losses.push_back(Damaged("session", id, status, "create it again"));
-      sessions_.Lose(tenant, id, losses.back());
-    } else if (!status.ok()) {
-      return Annotate(status, absl::StrCat("session ", id, ": "));
+      losses.push_back(Damaged("session", key.id, status, "create it again"));
+      sessions_.Lose(key.tenant, key.id, losses.back());
+      return absl::OkStatus();
     }
+    return Annotate(status, absl::StrCat("session ", key.id, ": "));
+  };
+  std::vector<StoreKey> keys;
+  std::vector<Start> starts;
+  for (const StoredSession& session : sessions) {
+    absl::StatusOr<Start> start = StartOf(session);
+    if (start.ok()) {
+      keys.push_back(session.key);
+      starts.push_back(*std::move(start));
+    } else {
+      DEFORM_RETURN_IF_ERROR(keep_or_lose(session.key, start.status()));
+    }
+  }
+  DEFORM_ASSIGN_OR_RETURN(const auto epochs, store().TakeOver(keys));
+  for (size_t i = 0; i < keys.size(); ++i) {
+    starts[i].stored.at.epoch = epochs[i];
+    DEFORM_RETURN_IF_ERROR(
+        keep_or_lose(keys[i], GoOn(keys[i].tenant, std::move(starts[i]))));
   }
   return losses;
 }
 
-absl::Status SessionManager::LoadOne(const StoredSession& stored) {
+absl::StatusOr<SessionManager::Start> SessionManager::StartOf(
+    const StoredSession& stored) {
   const auto& [tenant, id] = stored.key;
-  StoredStart start{.id = id, .create_time = stored.create_time};
-  DEFORM_ASSIGN_OR_RETURN(start.at, store().LoadSession(stored.key));
-  DEFORM_ASSIGN_OR_RETURN(auto binding,
-                          bindings_.Hold(tenant, start.at.binding_id,
-                                         absl::StrCat("session ", id)));
+  DEFORM_ASSIGN_OR_RETURN(auto at, store().LoadSession(stored.key));
+  DEFORM_ASSIGN_OR_RETURN(
+      auto binding,
+      bindings_.Hold(tenant, at.binding_id, absl::StrCat("session ", id)));
   DEFORM_ASSIGN_OR_RETURN(
       auto memory, budget_.Reserve(Session::BytesFor(binding.record()->facts),
                                    "the stored session needs"));
-  DEFORM_ASSIGN_OR_RETURN(start.at.epoch, store().TakeOver(stored.key));
-  DEFORM_ASSIGN_OR_RETURN(auto session,
-                          Session::Restore(std::move(start), std::move(binding),
-                                           std::move(memory), environment_));
+  return Start{.stored = {.id = id,
+                          .at = std::move(at),
+                          .create_time = stored.create_time},
+               .binding = std::move(binding),
+               .memory = std::move(memory)};
+}
+
+absl::Status SessionManager::GoOn(const std::string& tenant, Start start) {
+  const std::string id = start.stored.id;
+  DEFORM_ASSIGN_OR_RETURN(
+      auto session,
+      Session::Restore(std::move(start.stored), std::move(start.binding),
+                       std::move(start.memory), environment_));
   return sessions_.Insert(tenant, id, std::move(session)).status();
 }
 

@@ -81,7 +81,14 @@ class SessionManager {
 
  private:
   Store& store() { return bindings_.store(); }
-  absl::Status LoadOne(const StoredSession& stored);
+  // What a stored session needs to go on, but for its epoch.
+  struct Start {
+    StoredStart stored;
+    BindingCatalogue::Lease binding;
+    MemoryBudget::Reservation memory;
+  };
+  absl::StatusOr<Start> StartOf(const StoredSession& stored);
+  absl::Status GoOn(const std::string& tenant, Start start);
   // Into the store, in the place of one that was lost.
   absl::Status Put(const StoredSession& session);
   absl::Status Insert(const std::string& tenant, const std::string& id,

@@ -9,6 +9,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -77,10 +78,12 @@ class Store {
   virtual absl::Status PutSession(const StoredSession& session) = 0;
   // The durable revision. NotFound SESSION_NOT_FOUND.
   virtual absl::StatusOr<SessionPose> LoadSession(const StoreKey& session) = 0;
-  // Raises the epoch and returns it: appends of the epochs before are refused
-  // from now on, those that wait included, and the first of the new one is
-  // whole. NotFound SESSION_NOT_FOUND.
-  virtual absl::StatusOr<uint64_t> TakeOver(const StoreKey& session) = 0;
+  // Raises the epoch of each and returns them: appends of the epochs before are
+  // refused from now on, those that wait included, and the first of the new one
+  // is whole. All or none; it waits for the disk once. NotFound
+  // SESSION_NOT_FOUND.
+  virtual absl::StatusOr<std::vector<uint64_t>> TakeOver(
+      std::span<const StoreKey> sessions) = 0;
   // NotFound SESSION_NOT_FOUND.
   virtual absl::Status DeleteSession(const StoreKey& session) = 0;
 

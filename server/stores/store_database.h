@@ -58,7 +58,9 @@ class StoreDatabase {
   // Returns its number.
   absl::StatusOr<int64_t> PutSession(const StoredSession& session);
   absl::Status DeleteSession(const StoreKey& key);
-  absl::StatusOr<uint64_t> RaiseEpoch(const StoreKey& key);
+  // In one commit; those of `keys`, in their order.
+  absl::StatusOr<std::vector<uint64_t>> RaiseEpochs(
+      std::span<const StoreKey> keys);
   absl::StatusOr<SessionPose> LoadPose(const StoreKey& key);
 
   // For PoseJournal::Commit, within Atomically(). `refused` is about this one

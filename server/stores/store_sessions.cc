@@ -78,11 +78,19 @@ absl::Status StoreDatabase::WriteSession(int64_t number,
   return write.Bind(session.binding_id).BindBlob(body).Bind(number).Run();
 }
 
-absl::StatusOr<uint64_t> StoreDatabase::RaiseEpoch(const StoreKey& key) {
-  DEFORM_ASSIGN_OR_RETURN(SessionRow row, FindSession(key));
-  ++row.session.epoch;
-  DEFORM_RETURN_IF_ERROR(WriteSession(row.number, row.session));
-  return row.session.epoch;
+absl::StatusOr<std::vector<uint64_t>> StoreDatabase::RaiseEpochs(
+    std::span<const StoreKey> keys) {
+  std::vector<uint64_t> epochs;
+  const auto raise = [&]() -> absl::Status {
+    for (const StoreKey& key : keys) {
+      DEFORM_ASSIGN_OR_RETURN(SessionRow row, FindSession(key));
+      epochs.push_back(++row.session.epoch);
+      DEFORM_RETURN_IF_ERROR(WriteSession(row.number, row.session));
+    }
+    return absl::OkStatus();
+  };
+  DEFORM_RETURN_IF_ERROR(Atomically(raise));
+  return epochs;
 }
 
 absl::StatusOr<SessionPose> StoreDatabase::LoadPose(const StoreKey& key) {

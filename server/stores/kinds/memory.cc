@@ -117,12 +117,21 @@ class MemoryStore : public Store {
     return session->second.pose;
   }
 
-  absl::StatusOr<uint64_t> TakeOver(const StoreKey& key) override {
+  absl::StatusOr<std::vector<uint64_t>> TakeOver(
+      std::span<const StoreKey> keys) override {
     MutexLock lock(mutex_);
-    const auto session = sessions_.find(key);
-    if (session == sessions_.end()) return NotStored("session", key);
-    session->second.needs_whole = true;
-    return ++session->second.pose.epoch;
+    std::vector<Session*> taken;
+    for (const StoreKey& key : keys) {
+      const auto session = sessions_.find(key);
+      if (session == sessions_.end()) return NotStored("session", key);
+      taken.push_back(&session->second);
+    }
+    std::vector<uint64_t> epochs;
+    for (Session* session : taken) {
+      session->needs_whole = true;
+      epochs.push_back(++session->pose.epoch);
+    }
+    return epochs;
   }
 
   absl::Status DeleteSession(const StoreKey& key) override {

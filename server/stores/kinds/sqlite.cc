@@ -142,11 +142,15 @@ class SqliteStore : public Store {
     return Locked([&](StoreDatabase& rows) { return rows.LoadPose(session); });
   }
 
-  absl::StatusOr<uint64_t> TakeOver(const StoreKey& session) override {
-    return Locked([&](StoreDatabase& rows) -> absl::StatusOr<uint64_t> {
-      DEFORM_ASSIGN_OR_RETURN(const uint64_t epoch, rows.RaiseEpoch(session));
-      journal_.TakeOver(session, epoch);
-      return epoch;
+  absl::StatusOr<std::vector<uint64_t>> TakeOver(
+      std::span<const StoreKey> sessions) override {
+    using Epochs = std::vector<uint64_t>;
+    return Locked([&](StoreDatabase& rows) -> absl::StatusOr<Epochs> {
+      DEFORM_ASSIGN_OR_RETURN(Epochs epochs, rows.RaiseEpochs(sessions));
+      for (size_t i = 0; i < sessions.size(); ++i) {
+        journal_.TakeOver(sessions[i], epochs[i]);
+      }
+      return epochs;
     });
   }
 

@@ -66,7 +66,8 @@ class AppendStore : public Store {
   absl::StatusOr<SessionPose> LoadSession(const StoreKey&) override {
     return Unused();
   }
-  absl::StatusOr<uint64_t> TakeOver(const StoreKey&) override {
+  absl::StatusOr<std::vector<uint64_t>> TakeOver(
+      std::span<const StoreKey>) override {
     return Unused();
   }
   absl::Status DeleteSession(const StoreKey&) override { return Unused(); }

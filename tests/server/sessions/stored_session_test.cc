@@ -194,7 +194,8 @@ TEST(StoredSessions, EndWhenAnotherServerHasTakenThemOver) {
   FakeStream& stream = life.Join("s");
   life.Run();
   stream.TakeFrame();
-  EXPECT_EQ(life.life().store().TakeOver({"t", "s"}).value(), 2u);
+  const std::vector<StoreKey> key = {{"t", "s"}};
+  EXPECT_EQ(life.life().store().TakeOver(key).value()[0], 2u);
   stream.participant->Submit(1, MoveVertex(0, {9, 9, 9}));
   life.Run();
   const absl::Status end = stream.TakeEnd();

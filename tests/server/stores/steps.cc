@@ -200,8 +200,10 @@ absl::Status Do(const Step& step, const Reference& before, Store& store) {
           SessionOf(SessionKey(step.id), BindingKey(step.value).id));
     case Kind::kDeleteSession:
       return store.DeleteSession(SessionKey(step.id));
-    case Kind::kTakeOver:
-      return store.TakeOver(SessionKey(step.id)).status();
+    case Kind::kTakeOver: {
+      const std::vector<StoreKey> key = {SessionKey(step.id)};
+      return store.TakeOver(key).status();
+    }
     case Kind::kCollectOrphans:
       return store.CollectOrphans().status();
     default:

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <thread>
 
+#include "core/base/status_macros.h"
 #include "tests/server/stores/samples.h"
 #include "tests/server/stores/simulated_disk.h"
 #include "tests/support/temporary_folder.h"
@@ -69,6 +70,11 @@ class StoreContract : public testing::TestWithParam<Place> {
     if (!accepted.ok()) return accepted;
     store_->Sync().IgnoreError();
     return told;
+  }
+  absl::StatusOr<uint64_t> TakeOver(const StoreKey& key) {
+    DEFORM_ASSIGN_OR_RETURN(const std::vector<uint64_t> epochs,
+                            store_->TakeOver({&key, 1}));
+    return epochs.at(0);
   }
   SessionPose Pose(const StoreKey& key = kLive) {
     const auto pose = store_->LoadSession(key);
@@ -159,7 +165,7 @@ TEST_P(StoreContract, SaysWhatIsNotThere) {
   EXPECT_EQ(ReasonOf(store_->PutSession(SessionOf(Key("s"), "none"))),
             "BINDING_NOT_FOUND");
   EXPECT_EQ(ReasonOf(store_->LoadSession(none).status()), "SESSION_NOT_FOUND");
-  EXPECT_EQ(ReasonOf(store_->TakeOver(none).status()), "SESSION_NOT_FOUND");
+  EXPECT_EQ(ReasonOf(TakeOver(none).status()), "SESSION_NOT_FOUND");
   EXPECT_EQ(ReasonOf(store_->DeleteSession(none)), "SESSION_NOT_FOUND");
   EXPECT_EQ(ReasonOf(Append(Whole(none, 1, 1))), "SESSION_NOT_FOUND");
   EXPECT_EQ(store_->DurableRevision(none), 0u);
@@ -321,7 +327,7 @@ TEST_P(StoreContract, RefusesPosesThatAreNoPoses) {
 
 TEST_P(StoreContract, RefusesAStaleWriter) {
   ASSERT_TRUE(Append(Whole(kLive, 1, 1)).ok());
-  EXPECT_EQ(*store_->TakeOver(kLive), 2u);
+  EXPECT_EQ(*TakeOver(kLive), 2u);
   const absl::Status stale = Append(Whole(kLive, 2, 5));
   EXPECT_EQ(ReasonOf(stale), "STALE_EPOCH");
   EXPECT_THAT(
@@ -335,7 +341,21 @@ TEST_P(StoreContract, RefusesAStaleWriter) {
   Reopen();
   EXPECT_EQ(store_->Load()->sessions[0].epoch, 2u);
   EXPECT_EQ(Pose().pose.vertices(0, 0), 6);
-  EXPECT_EQ(*store_->TakeOver(kLive), 3u);
+  EXPECT_EQ(*TakeOver(kLive), 3u);
+}
+
+TEST_P(StoreContract, TakesManySessionsOverTogetherOrNone) {
+  ASSERT_TRUE(store_->PutSession(SessionOf(Key("second"), "bound")).ok());
+  const std::vector<StoreKey> both = {Key("second"), kLive};
+  EXPECT_THAT(*store_->TakeOver(both), testing::ElementsAre(2, 2));
+  ASSERT_TRUE(TakeOver(kLive).ok());
+  EXPECT_THAT(*store_->TakeOver(both), testing::ElementsAre(3, 4));
+  EXPECT_THAT(*store_->TakeOver({}), testing::IsEmpty());
+  const std::vector<StoreKey> lost = {Key("second"), Key("none")};
+  EXPECT_EQ(ReasonOf(store_->TakeOver(lost).status()), "SESSION_NOT_FOUND");
+  Reopen();
+  EXPECT_EQ(store_->LoadSession(Key("second"))->epoch, 3u);
+  EXPECT_EQ(store_->LoadSession(kLive)->epoch, 4u);
 }
 
 TEST_P(StoreContract, ASessionMovesToAnotherRig) {

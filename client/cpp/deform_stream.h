@@ -161,7 +161,8 @@ struct JoinedSession {
 // short stall. What was sent and not answered is kept, up to 4096 requests or
 // 64 MiB, and sent again as far as the server has not accepted it, so that each
 // is carried out once. The place is kept for a while on the server; if it has
-// forgotten it, or was restarted, all that was not answered is sent again.
+// forgotten it, all that was not answered is sent again. If the server died,
+// poses that it answered and had not made durable yet are sent again, too.
 // Revisions of that time are skipped, also with Delivery::kEvery.
 //
 // With Delivery::kEvery the server takes a pose only when the frame before has

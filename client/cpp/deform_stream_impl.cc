@@ -176,6 +176,7 @@ absl::Status DeformStream::Impl::TryToReconnect() {
     if (last_revision_) resume.set_last_revision(*last_revision_);
     resume.set_last_sequence(unanswered_.answered_up_to());
     resume.set_rig_changes(rig_changes_.size() - change_base_);
+    resume.set_attempt(resume.attempt() + 1);
   }
   reader_ = nullptr;
   DEFORM_ASSIGN_OR_RETURN(const v1::Joined joined, link->Join(join_));
@@ -207,13 +208,15 @@ absl::Status DeformStream::Impl::Adopt(std::shared_ptr<DeformLink> link,
   may_repeat_ = last_revision_.has_value();
   join_.mutable_resume()->set_token(joined.resume_token());
   known_.clear();
-  const bool kept = joined.resumed() && joined.session().epoch() == epoch_;
+  const bool restarted = joined.session().epoch() != epoch_;
+  const bool kept = joined.resumed() && !restarted;
   epoch_ = joined.session().epoch();
   MutexLock lock(mutex_);
   if (cancelled_) link->Cancel();
   link_ = std::move(link);
   broken_ = false;
   writes_done_ = false;
+  unanswered_.Rejoined(joined.last_sequence(), restarted);
   // A server that has taken the session over knows of no change before.
   if (!kept) {
     const uint64_t changes = rig_changes_.size() - change_base_;
@@ -225,7 +228,6 @@ absl::Status DeformStream::Impl::Adopt(std::shared_ptr<DeformLink> link,
     }
     change_base_ = rig_changes_.size();
   }
-  unanswered_.Rejoined(joined.last_sequence());
   // A limit is no reason not to go on.
   if (shown_) unanswered_.Add(0, *shown_).IgnoreError();
   if (draining_ || !(unanswered_.has_unsent() || closing_)) {
@@ -315,7 +317,8 @@ std::optional<absl::Status> DeformStream::Impl::HandleFrame(Frame& frame) {
   }
   {
     MutexLock lock(mutex_);
-    unanswered_.AnsweredUpTo(frame.answers_sequence);
+    unanswered_.AnsweredUpTo(frame.answers_sequence, frame.revision);
+    unanswered_.DurableUpTo(frame.durable_revision);
   }
   const bool repeats = std::exchange(may_repeat_, false) &&
                        frame.epoch == last_epoch_ &&

@@ -42,8 +42,30 @@ void Unanswered::Erase(size_t index) {
   if (index < sent_) --sent_;
 }
 
-void Unanswered::AnsweredUpTo(uint64_t sequence) {
-  while (sent_ > 0 && entries_.front().sequence <= sequence) Erase(0);
+void Unanswered::AnsweredUpTo(uint64_t sequence, uint64_t revision) {
+  while (sent_ > 0 && entries_.front().sequence <= sequence) {
+    if (entries_.front().request->has_pose()) {
+      answered_.push_back(entries_.front());
+      answered_.back().revision = revision;
+      answered_bytes_ += answered_.back().bytes;
+    }
+    Erase(0);
+  }
+  while (answered_.size() > kMaxAnswered ||
+         answered_bytes_ > kMaxAnsweredBytes) {
+    ForgetOldestAnswered();
+  }
+}
+
+void Unanswered::DurableUpTo(uint64_t revision) {
+  while (!answered_.empty() && answered_.front().revision <= revision) {
+    ForgetOldestAnswered();
+  }
+}
+
+void Unanswered::ForgetOldestAnswered() {
+  answered_bytes_ -= answered_.front().bytes;
+  answered_.pop_front();
 }
 
 bool Unanswered::Answered(uint64_t sequence) {
@@ -62,7 +84,15 @@ uint64_t Unanswered::answered_up_to() const {
   return last_;
 }
 
-void Unanswered::Rejoined(uint64_t accepted) {
+void Unanswered::Rejoined(uint64_t accepted, bool restarted) {
+  while (restarted && !answered_.empty()) {
+    if (answered_.back().sequence > accepted) {
+      bytes_ += answered_.back().bytes;
+      entries_.push_front(std::move(answered_.back()));
+    }
+    answered_.pop_back();
+  }
+  if (restarted) answered_bytes_ = 0;
   for (size_t i = entries_.size(); i-- > 0;) {
     if (entries_[i].sequence == 0) Erase(i);
   }

@@ -64,7 +64,8 @@ absl::StatusOr<Introduction> IntroductionOf(const v1::Join& join) {
       .wants_presence = join.presence(),
       .token = join.resume().token(),
       .last_sequence = join.resume().last_sequence(),
-      .rig_changes = join.resume().rig_changes()};
+      .rig_changes = join.resume().rig_changes(),
+      .attempt = join.resume().attempt()};
   if (join.resume().has_last_revision()) {
     who.last_revision = join.resume().last_revision();
   }

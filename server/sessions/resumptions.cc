@@ -51,6 +51,12 @@ Place* Resumptions::Find(int64_t participant) {
   return nullptr;
 }
 
+const Place* Resumptions::Find(const std::string& key, TimePoint now) const {
+  const auto found = places_.find(key);
+  if (found == places_.end() || found->second.until <= now) return nullptr;
+  return &found->second.place;
+}
+
 void Resumptions::DropExpired(TimePoint now) {
   std::erase_if(places_,
                 [now](const auto& kept) { return kept.second.until <= now; });

@@ -31,6 +31,7 @@ struct Place {
   uint64_t last_pose = 0;      // Of that, what a frame will answer.
   uint64_t contained = 0;      // Of what the present revision contains.
   uint64_t first_change = 0;   // Changes of the rig before it joined.
+  uint64_t attempt = 0;        // To come back, that succeeded last.
   EditHistory history;
   std::deque<Notice> notices;  // The last of them.
 };
@@ -49,6 +50,7 @@ class Resumptions {
   std::optional<Place> Take(const std::string& key, TimePoint now);
   // Null if there is none, or no more.
   Place* Find(int64_t participant);
+  const Place* Find(const std::string& key, TimePoint now) const;
 
   void DropExpired(TimePoint now);
   size_t size() const { return places_.size(); }

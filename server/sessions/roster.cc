@@ -37,6 +37,23 @@ std::optional<int64_t> Roster::SeatOf(int64_t id) const {
   return found->second;
 }
 
+absl::Status Roster::CheckAttempt(const Introduction& who, TimePoint now) {
+  if (who.token.empty() || who.attempt == 0) return absl::OkStatus();
+  const std::string key = ResumeKeyOf(who.token);
+  const auto seat = by_key_.find(key);
+  const Place* const place = seat != by_key_.end()
+                                 ? &members_[seat->second].place
+                                 : places_.Find(key, now);
+  if (place == nullptr || place->attempt <= who.attempt) {
+    return absl::OkStatus();
+  }
+  return MakeError(absl::StatusCode::kAborted,
+                   absl::StrCat("attempt ", who.attempt,
+                                " to come back was overtaken by attempt ",
+                                place->attempt, " (join.resume)"),
+                   {.reason = "TAKEN_OVER", .field = "join.resume"});
+}
+
 absl::StatusOr<Roster::Member*> Roster::Enter(int64_t seat,
                                               const Introduction& who,
                                               uint64_t rig_changes,
@@ -53,6 +70,7 @@ absl::StatusOr<Roster::Member*> Roster::Enter(int64_t seat,
     DEFORM_ASSIGN_OR_RETURN(member.token, MakeResumeToken());
     member.place = {.participant = next_id_++, .first_change = rig_changes};
   }
+  member.place.attempt = who.attempt;
   member.key = ResumeKeyOf(member.token);
   presence_.Enter({.id = member.id(),
                    .name = who.name,

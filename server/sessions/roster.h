@@ -37,6 +37,8 @@ struct Introduction {
   std::optional<uint64_t> last_revision;
   uint64_t last_sequence = 0;
   uint64_t rig_changes = 0;
+  // Counts the attempts to come back with the token; 0: not counted.
+  uint64_t attempt = 0;
 };
 
 // What a pose asks for beside its places.
@@ -80,6 +82,8 @@ class Roster {
 
   // The seat of whoever has this token now.
   std::optional<int64_t> SeatOf(const std::string& token) const;
+  // Aborted TAKEN_OVER: a later attempt with this token has been here.
+  absl::Status CheckAttempt(const Introduction& who, TimePoint now);
   // Takes the seat, as who has the token was, or as somebody new if nobody is
   // known by it. Nobody has it now. `rig_changes`: those that there were.
   // InvalidArgument NAME_TOO_LONG; Internal.

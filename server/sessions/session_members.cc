@@ -21,6 +21,7 @@ absl::StatusOr<Session::Joined> Session::Join(Delivery delivery,
     if (closed_) return *closed_;
     DEFORM_ASSIGN_OR_RETURN(const FrameFormat format,
                             PickFormat(wishes, facts().rig()));
+    DEFORM_RETURN_IF_ERROR(roster_.CheckAttempt(who, now));
     if (const auto before = roster_.SeatOf(who.token)) {
       to_wake = audience_.receivers({&*before, 1});
       Dismiss(*before);

@@ -56,10 +56,10 @@ TEST_F(UnansweredTest, ForgetsWhatWasAnswered) {
   EXPECT_EQ(waiting_.answered_up_to(), 0u);
   EXPECT_TRUE(waiting_.Answered(4));
   EXPECT_FALSE(waiting_.Answered(4));
-  waiting_.AnsweredUpTo(2);
+  waiting_.AnsweredUpTo(2, 1);
   EXPECT_EQ(waiting_.answered_up_to(), 2u);
   EXPECT_EQ(waiting_.size(), 2u);
-  waiting_.AnsweredUpTo(5);
+  waiting_.AnsweredUpTo(5, 1);
   EXPECT_EQ(waiting_.answered_up_to(), 5u);
   EXPECT_EQ(waiting_.size(), 0u);
 }
@@ -68,18 +68,58 @@ TEST_F(UnansweredTest, SendsAgainWhatWasNotAccepted) {
   Add(1, 5);
   SendAll();
   Add(6, 6);
-  waiting_.AnsweredUpTo(1);
-  waiting_.Rejoined(3);
+  waiting_.AnsweredUpTo(1, 1);
+  waiting_.Rejoined(3, false);
   EXPECT_THAT(SendAll(), ElementsAre(4, 5, 6));
-  waiting_.AnsweredUpTo(3);
+  waiting_.AnsweredUpTo(3, 1);
   EXPECT_EQ(waiting_.size(), 3u);
-  waiting_.Rejoined(0);
+  waiting_.Rejoined(0, false);
   EXPECT_THAT(SendAll(), ElementsAre(4, 5, 6));
+}
+
+TEST_F(UnansweredTest, SendsAgainWhatAServerAnsweredAndLost) {
+  Add(1, 6);
+  SendAll();
+  waiting_.AnsweredUpTo(2, 10);
+  waiting_.AnsweredUpTo(5, 11);
+  waiting_.DurableUpTo(10);
+  // The same server has all that it answered.
+  waiting_.Rejoined(6, false);
+  EXPECT_THAT(SendAll(), IsEmpty());
+  // The next has more than was known to be durable, and less than was answered.
+  waiting_.Rejoined(4, true);
+  EXPECT_EQ(waiting_.answered_up_to(), 4u);
+  EXPECT_THAT(SendAll(), ElementsAre(5, 6));
+  // What it has is not kept for one that follows.
+  waiting_.Rejoined(0, true);
+  EXPECT_THAT(SendAll(), ElementsAre(5, 6));
+}
+
+TEST_F(UnansweredTest, SendsNothingAgainThatIsDurable) {
+  Add(1, 3);
+  SendAll();
+  waiting_.AnsweredUpTo(3, 7);
+  waiting_.DurableUpTo(7);
+  waiting_.Rejoined(0, true);
+  EXPECT_THAT(SendAll(), IsEmpty());
+}
+
+TEST_F(UnansweredTest, KeepsTheLastAnswersWhereNothingBecomesDurable) {
+  const uint64_t count = Unanswered::kMaxAnswered + 10;
+  for (uint64_t i = 1; i <= count; ++i) {
+    Add(i, i);
+    SendAll();
+    waiting_.AnsweredUpTo(i, i);
+  }
+  EXPECT_EQ(waiting_.size(), 0u);
+  waiting_.Rejoined(0, true);
+  EXPECT_EQ(waiting_.size(), Unanswered::kMaxAnswered);
+  EXPECT_EQ(waiting_.answered_up_to(), 10u);
 }
 
 TEST_F(UnansweredTest, WhatIsNotSentIsNotAnswered) {
   Add(1, 2);
-  waiting_.AnsweredUpTo(2);
+  waiting_.AnsweredUpTo(2, 1);
   EXPECT_FALSE(waiting_.Answered(1));
   EXPECT_THAT(SendAll(), ElementsAre(1, 2));
 }
@@ -91,7 +131,7 @@ TEST_F(UnansweredTest, WhatWantsNoAnswerIsForgotten) {
   EXPECT_THAT(SendAll(), ElementsAre(1, 0, 2));
   EXPECT_EQ(waiting_.size(), 2u);
   ASSERT_TRUE(waiting_.Add(0, Pose(0)).ok());
-  waiting_.Rejoined(1);
+  waiting_.Rejoined(1, false);
   EXPECT_THAT(SendAll(), ElementsAre(2));
 }
 
@@ -102,7 +142,7 @@ TEST_F(UnansweredTest, IsBounded) {
   EXPECT_EQ(DetailOf(full).reason, "UNANSWERED_LIMIT");
   EXPECT_THAT(std::string(full.message()), HasSubstr("4096 requests"));
   SendAll();
-  waiting_.AnsweredUpTo(1);
+  waiting_.AnsweredUpTo(1, 1);
   EXPECT_TRUE(waiting_.Add(Unanswered::kMaxRequests + 1, Pose(1)).ok());
 
   Unanswered large;

@@ -337,6 +337,27 @@ TEST_F(ParticipantsTest, AStreamThatStillHasThePlaceIsEnded) {
   EXPECT_EQ(session_->state().participants, 1);
 }
 
+TEST_F(ParticipantsTest, AnAttemptThatComesLateTakesNoPlace) {
+  Guest anna = JoinAndSee({});
+  Guest back = Join({.token = anna.token, .attempt = 2});
+  const auto refused = [&](uint64_t attempt) {
+    Guest late;
+    return TryJoin(late, {.token = anna.token, .attempt = attempt},
+                   Delivery::kLatest)
+        .status();
+  };
+  const absl::Status status = refused(1);
+  EXPECT_EQ(status.code(), absl::StatusCode::kAborted);
+  EXPECT_EQ(DetailOf(status).reason, "TAKEN_OVER");
+  EXPECT_THAT(std::string(status.message()),
+              HasSubstr("attempt 1 to come back was overtaken by attempt 2"));
+  EXPECT_TRUE(Put(back, 1, 3, 1));
+  // Nor one that is kept.
+  back.participant.reset();
+  EXPECT_EQ(DetailOf(refused(1)).reason, "TAKEN_OVER");
+  EXPECT_TRUE(Join({.token = anna.token, .attempt = 3}).resumed);
+}
+
 TEST_F(ParticipantsTest, APlaceIsKeptForAWhile) {
   Guest anna = JoinAndSee({});
   Put(anna, 1, 3, 1);

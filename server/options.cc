@@ -80,9 +80,12 @@ void VisitOptions(SomeOptions& o, Visitor&& visit) {
   visit("max-sessions", o.max_sessions, 1, kMax, "Sessions of all tenants.");
   visit("max-participants", o.max_participants, 1, 100'000,
         "Streams that may join one session.");
+  visit("max-backups", o.max_backups, 0, 10'000,
+        "Backups that clients may have made in data-dir/backups; more must "
+        "wait until some are moved elsewhere.");
   visit("stall-timeout", o.stall_timeout, 0.1, 86'400,
-        "Seconds after which a stream that takes no message, or a call that "
-        "neither sends nor reads, is ended.");
+        "Seconds after which a call is ended whose client is waited for and "
+        "neither sends what it has announced nor reads what it asked for.");
   visit("resume-grace", o.resume_grace, 0, 86'400,
         "Seconds for which the place of a participant whose stream broke is "
         "kept: it comes back with the token that it has.");

@@ -53,6 +53,7 @@ struct Options {
   Bytes max_drags_memory{int64_t{256} << 20};
   int64_t max_sessions = 1'000;
   int max_participants = 64;
+  int64_t max_backups = 16;
 
   Seconds stall_timeout{10};
   Seconds resume_grace{60};

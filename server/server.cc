@@ -92,6 +92,8 @@ void Warn(const Losses& losses) {
 struct Server::Parts {
   Parts(const Options& options, std::unique_ptr<Store> opened)
       : store(std::move(opened)),
+        backups(*store, PosixFileSystem(), options.data_dir + "/backups",
+                options.max_backups),
         compute(std::make_unique<ThreadPool>(
             ThreadPool::Options{.threads = options.compute_threads})),
         binds({.threads = options.compute_threads,
@@ -139,6 +141,7 @@ struct Server::Parts {
   }
 
   const std::unique_ptr<Store> store;
+  BackupFolder backups;
   std::unique_ptr<ThreadPool> compute;  // Deforming and encoding.
   ThreadPool binds;                     // Weights.
   ThreadPool background;  // Weights again, for those who ask to see them.
@@ -168,7 +171,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Options& options) {
                          .bindings = parts->bindings,
                          .sessions = parts->sessions,
                          .background = parts->background,
-                         .backup_dir = options.data_dir + "/backups"}));
+                         .backups = parts->backups}));
   return std::unique_ptr<Server>(new Server(std::move(parts)));
 }
 

@@ -10,6 +10,7 @@
 #include "server/models/binding_registry.h"
 #include "server/models/model_registry.h"
 #include "server/sessions/session_manager.h"
+#include "server/stores/backup_folder.h"
 
 namespace deform::server {
 
@@ -19,7 +20,7 @@ struct Rooms {
   BindingRegistry& bindings;
   SessionManager& sessions;
   ThreadPool& background;  // For long computations.
-  std::string backup_dir;  // Where backups are made, each in a folder.
+  BackupFolder& backups;
 };
 
 class GrpcServer {

@@ -45,10 +45,9 @@ grpc::Status ServerService::Backup(grpc::ServerContext* context,
   return calls_.Run("Backup", *context, [&]() -> absl::Status {
     // Nobody chooses a path on the server's machine.
     DEFORM_RETURN_IF_ERROR(CheckName(request->name(), "name"));
-    const std::string directory =
-        absl::StrCat(rooms_.backup_dir, "/", request->name());
-    DEFORM_RETURN_IF_ERROR(rooms_.models.store().Backup(directory));
-    response->set_directory(directory);
+    DEFORM_ASSIGN_OR_RETURN(std::string directory,
+                            rooms_.backups.Make(request->name()));
+    response->set_directory(std::move(directory));
     return absl::OkStatus();
   });
 }

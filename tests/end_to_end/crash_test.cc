@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <random>
 #include <set>
 #include <string>
@@ -22,6 +23,7 @@
 #include "tests/end_to_end/process.h"
 #include "tests/end_to_end/raw_call.h"
 #include "tests/end_to_end/running_server.h"
+#include "tests/support/tcp_proxy.h"
 #include "tests/support/temporary_folder.h"
 
 namespace deform {
@@ -307,6 +309,48 @@ TEST_F(Crashes, LoseNothingThatWasAcknowledged) {
   }
 }
 
+// A stream that is not told: it joins again by itself, and what it sent and the
+// server had not made durable comes again, answered or not.
+TEST_F(Crashes, LoseNoPoseOfADragThatGoesOn) {
+  const int kills = Kills();
+  std::optional<Daemon> daemon(std::in_place, Arguments());
+  TcpProxy proxy(daemon->address());
+  Client client = Client::Connect(proxy.address()).value();
+  Begin(client);
+  auto stream = client.Deform(kSession).value();
+  deform::Pose expected = RestPose(Cube());
+  uint64_t sent = 0;
+  const auto send = [&](uint64_t count) {
+    for (const uint64_t last = sent + count; sent < last; ++sent) {
+      const PoseUpdate update = {
+          .vertices = {static_cast<int32_t>(sent % kVertices)},
+          .positions = PlaceOf(sent, sent % kVertices).transpose()};
+      ApplyPoseUpdate(update, expected);
+      ASSERT_EQ(stream.Send(update).value(), sent + 1);
+    }
+  };
+  Frame frame;
+  for (int life = 0; life < kills; ++life) {
+    SCOPED_TRACE(absl::StrCat("life ", life));
+    const uint64_t answered = sent + 1 + random_() % 6;
+    send(8);
+    do {
+      ASSERT_TRUE(stream.NextFrame(frame).ok());
+    } while (frame.answers_sequence < answered);
+    daemon.reset();
+    send(1);
+    daemon.emplace(Arguments());
+    proxy.SetTarget(daemon->address());
+    do {
+      ASSERT_TRUE(stream.NextFrame(frame).ok());
+    } while (frame.answers_sequence < sent);
+    Client other = Client::Connect(daemon->address()).value();
+    ASSERT_EQ(other.Deform(kSession)->joined().pose.vertices,
+              expected.vertices);
+  }
+  EXPECT_EQ(stream.reconnections(), kills);
+}
+
 std::vector<std::string> DataDir(const std::string& path) {
   return {"--data-dir", path};
 }
@@ -347,6 +391,23 @@ TEST(Backups, AreNotRestoredOverWhatIsThere) {
   Process in_memory({"--in-memory", "--restore", path});
   EXPECT_THAT(in_memory.ReadErrors(), testing::HasSubstr("--in-memory"));
   EXPECT_EQ(in_memory.Wait(), 2);
+}
+
+TEST(Backups, AreNoMoreThanTheServerMayKeep) {
+  auto arguments = DataDir(Temporary().Path("full"));
+  arguments.insert(arguments.end(), {"--max-backups", "2"});
+  Daemon daemon(arguments);
+  Client client = Client::Connect(daemon.address()).value();
+  EXPECT_TRUE(client.Backup("monday").ok());
+  const std::string tuesday = client.Backup("tuesday").value();
+  const absl::Status full = client.Backup("wednesday").status();
+  EXPECT_EQ(full.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(DetailOf(full).reason, "TOO_MANY_BACKUPS");
+  EXPECT_THAT(std::string(full.message()),
+              testing::HasSubstr("holds 2 backups, its limit (max-backups): "
+                                 "move some elsewhere"));
+  std::filesystem::rename(tuesday, Temporary().Path("moved"));
+  EXPECT_TRUE(client.Backup("wednesday").ok());
 }
 
 TEST(Backups, AreNotMadeOfAServerThatKeepsNothing) {

@@ -12,6 +12,7 @@
 #include "server/rpc/grpc_server.h"
 #include "server/sessions/batch_scheduler.h"
 #include "server/sessions/session_manager.h"
+#include "server/sessions/timer.h"
 #include "server/stores/store.h"
 
 namespace deform::server {
@@ -65,13 +66,18 @@ BatchScheduler::Options BatchOptions(ThreadPool& compute) {
 }
 
 SessionEnvironment EnvironmentOf(const Options& options,
-                                 BatchScheduler& scheduler, Allowance& drags) {
+                                 BatchScheduler& scheduler, Allowance& drags,
+                                 Timer& timer) {
   return {.scheduler = &scheduler,
           .drags = &drags,
           .clock = [] { return std::chrono::steady_clock::now(); },
           .max_participants = options.max_participants,
           .stall_timeout = options.stall_timeout.milliseconds(),
           .resume_grace = options.resume_grace.milliseconds(),
+          .call_at =
+              [&timer](Timer::TimePoint time, std::function<void()> task) {
+                timer.At(time, std::move(task));
+              },
           .report = [](const absl::Status& status) { Warn(status); }};
 }
 
@@ -113,7 +119,7 @@ struct Server::Parts {
         sessions(bindings,
                  {.memory = options.max_sessions_memory.value,
                   .count = options.max_sessions},
-                 EnvironmentOf(options, scheduler, drags),
+                 EnvironmentOf(options, scheduler, drags, timer),
                  [this](std::function<void()> task) {
                    wakes->Submit(std::move(task));
                  }) {}
@@ -135,6 +141,7 @@ struct Server::Parts {
   // then the rest, from the top down.
   ~Parts() {
     grpc.reset();
+    timer.Stop();
     sessions.StopWaiting();
     wakes.reset();
     compute.reset();
@@ -153,6 +160,7 @@ struct Server::Parts {
   BindingRegistry bindings;
   BatchScheduler scheduler;
   Allowance drags;
+  Timer timer;  // For receivers of few frames.
   SessionManager sessions;
   std::unique_ptr<GrpcServer> grpc;
 };

@@ -120,6 +120,7 @@ Json ToJson(const LoadSubject& subject, const LoadReport& report) {
           {"sessions", options.sessions},
           {"editors", options.editors},
           {"viewers", options.viewers},
+          {"viewer_fps", options.viewer_fps},
           {"rate", options.rate},
           {"delivery",
            options.frames.delivery == Delivery::kEvery ? "every" : "latest"},

@@ -104,6 +104,7 @@ struct Client::Impl {
                                                           : v1::ROLE_EDITOR);
     join.set_name(wanted.name);
     join.set_presence(wanted.on_participants != nullptr);
+    join.set_max_fps(wanted.max_fps);
     if (wanted.tolerance) join.set_tolerance(*wanted.tolerance);
     if (wanted.tolerance_fraction) {
       join.set_tolerance_fraction(*wanted.tolerance_fraction);

@@ -64,6 +64,9 @@ struct DeformOptions {
   // Frame encodings to choose from, best first (frame.proto). Empty: "float32",
   // or, with a tolerance, whichever takes fewest bytes.
   std::vector<std::string> encodings;
+  // With kLatest, frames a second at most, 0.01 to 1000; 0: as they come. The
+  // last state always comes.
+  double max_fps = 0;
 
   ParticipantRole role = ParticipantRole::kEditor;
   std::string name;  // Shown to others; at most 64 bytes.

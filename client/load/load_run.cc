@@ -131,9 +131,12 @@ class Run {
 
   absl::Status Join() {
     size_t next = 0;
+    DeformOptions viewing = options_.frames;
+    viewing.max_fps = options_.viewer_fps;
     for (const auto& session : sessions_) {
       for (int p = 0; p < session->participants(); ++p) {
-        session->Start(clients_[next++ % clients_.size()], p, options_.frames);
+        session->Start(clients_[next++ % clients_.size()], p,
+                       p < options_.editors ? options_.frames : viewing);
       }
     }
     const auto deadline = Clock::now() + kJoinPatience;

@@ -29,6 +29,9 @@ struct LoadOptions {
   int editors = 1;   // Of each session.
   int viewers = 0;   // Likewise.
   double rate = 60;  // Poses a second of an editor.
+  // Frames a second of a viewer, at most, with Delivery::kLatest; 0: as they
+  // come.
+  double viewer_fps = 0;
   DeformOptions frames;
   std::chrono::nanoseconds duration{std::chrono::seconds(10)};
   std::chrono::nanoseconds warm_up{std::chrono::seconds(1)};

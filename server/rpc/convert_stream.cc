@@ -28,6 +28,7 @@ absl::Status ReadWishes(const v1::Join& join, FrameWishes& wishes) {
                                      absl::StrJoin(known, ", ")));
   }
   wishes.cheapest = join.cheapest_encoding();
+  wishes.max_fps = join.max_fps();
   if (join.has_tolerance()) wishes.tolerance = join.tolerance();
   if (join.has_tolerance_fraction()) {
     wishes.tolerance_fraction = join.tolerance_fraction();

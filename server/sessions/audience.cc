@@ -6,28 +6,25 @@
 
 namespace deform::server {
 
-bool Audience::Seat::CanBeServed() const {
+bool Audience::Seat::HasRoom() const {
   if (outbox.delivery() == Delivery::kEvery) return !outbox.full();
-  if (!format.encoding->uses_grid()) return true;
+  if (!format.encoding->uses_grid() && interval.count() == 0) return true;
   return !waiting_since && !outbox.has_frames();
 }
 
-bool Audience::Seat::MustSeeThis() const {
-  return needs_frame && CanBeServed() &&
-         (!offered_any || outbox.delivery() == Delivery::kEvery);
-}
-
-int64_t Audience::Add(Delivery delivery, const FrameFormat& format,
-                      std::weak_ptr<Receiver> receiver, const Rejoining& from) {
-  Seat seat{.outbox = Outbox(delivery),
-            .format = format,
+int64_t Audience::Add(const Subscription& wanted,
+                      std::weak_ptr<Receiver> receiver, TimePoint now,
+                      const Rejoining& from) {
+  Seat seat{.outbox = Outbox(wanted.delivery),
+            .format = wanted.format,
+            .interval = wanted.interval,
             .receiver = std::move(receiver)};
   seat.contained = from.contained;
   seat.outbox.Expect(from.last_pose);
   if (from.revision) seat.outbox.GoOnFrom(*from.revision);
   for (const auto& change : from.changes) seat.outbox.Announce(change);
   for (const Notice& notice : from.notices) seat.outbox.Notify(notice);
-  Serve(seat);
+  Serve(seat, now);
   const int64_t number = next_seat_++;
   seats_.emplace(number, std::move(seat));
   return number;
@@ -58,26 +55,39 @@ bool Audience::HasRoomForRigChange() const {
          });
 }
 
-bool Audience::NeedsFrame() const {
-  return std::any_of(seats_.begin(), seats_.end(), [](const auto& seat) {
-    return seat.second.needs_frame && seat.second.CanBeServed();
+bool Audience::NeedsFrame(TimePoint now) const {
+  return std::any_of(seats_.begin(), seats_.end(), [&](const auto& seat) {
+    return seat.second.LacksFrame(now);
   });
 }
 
-bool Audience::MustSeeThis() const {
-  return std::any_of(seats_.begin(), seats_.end(), [](const auto& seat) {
-    return seat.second.MustSeeThis();
+bool Audience::MustSeeThis(TimePoint now) const {
+  return std::any_of(seats_.begin(), seats_.end(), [&](const auto& entry) {
+    const Seat& seat = entry.second;
+    return seat.LacksFrame(now) &&
+           (!seat.offered_any || seat.outbox.delivery() == Delivery::kEvery);
   });
 }
 
-std::vector<FrameKey> Audience::Wanted(bool by_all) const {
+std::vector<FrameKey> Audience::Wanted(bool by_all, TimePoint now) const {
   std::set<FrameKey> wanted;
   for (const auto& [number, seat] : seats_) {
-    if ((by_all || seat.needs_frame) && seat.CanBeServed()) {
+    if (by_all ? seat.CanBeServed(now) : seat.LacksFrame(now)) {
       wanted.insert(seat.key());
     }
   }
   return {wanted.begin(), wanted.end()};
+}
+
+std::optional<Audience::TimePoint> Audience::NextDue() const {
+  std::optional<TimePoint> next;
+  for (const auto& [number, seat] : seats_) {
+    if (seat.interval.count() == 0 || !seat.needs_frame || !seat.HasRoom()) {
+      continue;
+    }
+    next = next ? std::min(*next, seat.due) : seat.due;
+  }
+  return next;
 }
 
 void Audience::Contain(int64_t seat, uint64_t sequence) {
@@ -89,26 +99,36 @@ void Audience::Announce(const std::shared_ptr<const RigChange>& change) {
   for (auto& [number, seat] : seats_) seat.outbox.Announce(change);
 }
 
-void Audience::Publish(uint64_t revision, Frames frames) {
+void Audience::Publish(uint64_t revision, Frames frames, TimePoint now) {
   const bool newer = revision != revision_;
   if (newer) frames_.clear();
   revision_ = revision;
   frames_.merge(frames);
   for (auto& [number, seat] : seats_) {
     if (newer) seat.needs_frame = true;
-    if (seat.needs_frame && seat.CanBeServed()) Serve(seat);
+    Serve(seat, now);
   }
 }
 
-void Audience::Serve(Seat& seat) {
+Audience::Receivers Audience::Serve(TimePoint now) {
+  Receivers served;
+  for (auto& [number, seat] : seats_) {
+    if (Serve(seat, now)) served.push_back(seat.receiver);
+  }
+  return served;
+}
+
+bool Audience::Serve(Seat& seat, TimePoint now) {
+  if (!seat.LacksFrame(now)) return false;
   const auto found = frames_.find(seat.key());
   // Who joined while frames were made may want one that nobody asked for.
-  if (found == frames_.end()) return;
+  if (found == frames_.end()) return false;
   const std::shared_ptr<const Frame>& frame = found->second;
   seat.outbox.Offer(frame, seat.contained);
   if (frame->grid != nullptr) seat.held = frame->grid;
   seat.needs_frame = false;
   seat.offered_any = true;
+  return true;
 }
 
 void Audience::EndNow(const absl::Status& status) {
@@ -122,9 +142,14 @@ void Audience::EndWhenAnswered(const absl::Status& status) {
 std::optional<Outgoing> Audience::Take(int64_t seat, TimePoint now) {
   const auto found = seats_.find(seat);
   if (found == seats_.end()) return std::nullopt;
-  std::optional<Outgoing> next = found->second.outbox.Take();
-  found->second.waiting_since.reset();
-  if (next) found->second.waiting_since = now;
+  Seat& taking = found->second;
+  taking.waiting_since.reset();
+  std::optional<Outgoing> next = taking.outbox.Take();
+  if (!next && Serve(taking, now)) next = taking.outbox.Take();
+  if (next) taking.waiting_since = now;
+  if (next && std::holds_alternative<FrameToSend>(*next)) {
+    taking.due = now + taking.interval;
+  }
   return next;
 }
 

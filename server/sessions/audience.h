@@ -13,6 +13,7 @@
 #include "absl/status/status.h"
 #include "server/sessions/frame.h"
 #include "server/sessions/frame_maker.h"
+#include "server/sessions/frame_wishes.h"
 #include "server/sessions/outbox.h"
 #include "server/sessions/rig_change.h"
 
@@ -41,7 +42,8 @@ struct Rejoining {
 // A receiver holds one revision on a grid: the last that it was offered, since
 // streams lose nothing. So a frame that refers to another may not be replaced
 // in the outbox: with delivery LATEST such a seat is offered one only when
-// nothing is under way to it, and is served late otherwise. Others are always
+// nothing is under way to it, and is served late otherwise. So is one that
+// wants few frames, and only when its interval is over. Others are always
 // offered the newest, in which they share.
 //
 // Not thread-safe. A seat that is not there (any more) takes nothing in.
@@ -52,8 +54,8 @@ class Audience {
 
   // Gives a seat, which gets a frame of the present revision: at once if there
   // is one, else it needs one.
-  int64_t Add(Delivery delivery, const FrameFormat& format,
-              std::weak_ptr<Receiver> receiver, const Rejoining& from = {});
+  int64_t Add(const Subscription& wanted, std::weak_ptr<Receiver> receiver,
+              TimePoint now, const Rejoining& from = {});
   // Of whom is added next.
   int64_t next_seat() const { return next_seat_; }
   void Remove(int64_t seat) { seats_.erase(seat); }
@@ -68,11 +70,14 @@ class Audience {
   // And for a change of the rig before it.
   bool HasRoomForRigChange() const;
   // Somebody who can be served lacks a frame of the present revision.
-  bool NeedsFrame() const;
+  bool NeedsFrame(TimePoint now) const;
   // And must see this one: a next revision would come too early.
-  bool MustSeeThis() const;
+  bool MustSeeThis(TimePoint now) const;
   // The frames to be made for those who can be served: who lack one, or all.
-  std::vector<FrameKey> Wanted(bool by_all) const;
+  std::vector<FrameKey> Wanted(bool by_all, TimePoint now) const;
+  // When somebody can be served next who lacks a frame, has nothing under way
+  // and waits for his interval to be over; none if nobody does.
+  std::optional<TimePoint> NextDue() const;
 
   // The revision that is published next contains this pose of the seat's.
   void Contain(int64_t seat, uint64_t sequence);
@@ -81,13 +86,17 @@ class Audience {
   void Announce(const std::shared_ptr<const RigChange>& change);
   // Frames of the present revision, or of the next, for which there is room.
   // Who can be served gets his, as far as it is there; others lack one.
-  void Publish(uint64_t revision, Frames frames);
+  void Publish(uint64_t revision, Frames frames, TimePoint now);
+  // Who lacks a frame of the present revision and can be served by now gets
+  // his, as far as it is there. Tells who.
+  Receivers Serve(TimePoint now);
 
   // See Outbox.
   void EndNow(const absl::Status& status);
   void EndWhenAnswered(const absl::Status& status);
 
-  // What the seat is to be sent next; what it took before has been sent.
+  // What the seat is to be sent next; what it took before has been sent, so
+  // that it may be served by now.
   std::optional<Outgoing> Take(int64_t seat, TimePoint now);
   // Part of what it took has been sent.
   void Progressed(int64_t seat, TimePoint now);
@@ -101,20 +110,28 @@ class Audience {
   struct Seat {
     Outbox outbox;
     FrameFormat format;
+    std::chrono::nanoseconds interval{0};
     std::weak_ptr<Receiver> receiver;
     uint64_t contained = 0;  // Newest pose that the revision contains.
     bool needs_frame = true;
     bool offered_any = false;
     std::shared_ptr<const RevisionGrid> held;
     std::optional<TimePoint> waiting_since;
+    TimePoint due = TimePoint::min();  // No frame before, unless in a hurry.
 
     FrameKey key() const { return {format, held}; }
-    bool CanBeServed() const;
-    bool MustSeeThis() const;
+    bool HasRoom() const;
+    bool CanBeServed(TimePoint now) const {
+      return HasRoom() && (now >= due || outbox.in_a_hurry());
+    }
+    bool LacksFrame(TimePoint now) const {
+      return needs_frame && CanBeServed(now);
+    }
   };
 
-  // Gives the seat its frame of the present revision, if it is there.
-  void Serve(Seat& seat);
+  // Gives the seat its frame of the present revision. False if it lacks none,
+  // cannot be served or it is not there.
+  bool Serve(Seat& seat, TimePoint now);
 
   std::map<int64_t, Seat> seats_;
   int64_t next_seat_ = 1;

@@ -1,6 +1,7 @@
 #include "server/sessions/frame_wishes.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -11,6 +12,9 @@
 
 namespace deform::server {
 namespace {
+
+constexpr double kLeastFps = 0.01;
+constexpr double kMostFps = 1000;
 
 // In model units; none if none is stated.
 absl::StatusOr<std::optional<double>> ToleranceOf(const FrameWishes& wishes,
@@ -26,6 +30,23 @@ absl::StatusOr<std::optional<double>> ToleranceOf(const FrameWishes& wishes,
                                : *wishes.tolerance_fraction * diagonal;
   DEFORM_RETURN_IF_ERROR(CheckTolerance(tolerance));
   return tolerance;
+}
+
+absl::StatusOr<std::chrono::nanoseconds> IntervalOf(Delivery delivery,
+                                                    double max_fps) {
+  if (max_fps == 0) return std::chrono::nanoseconds(0);
+  if (!(max_fps >= kLeastFps && max_fps <= kMostFps)) {
+    return InvalidInput(
+        "MAX_FPS_OUT_OF_RANGE", "max_fps",
+        absl::StrCat("max_fps is ", max_fps, ", neither 0 nor within ",
+                     kLeastFps, " and ", kMostFps));
+  }
+  if (delivery == Delivery::kEvery) {
+    return InvalidInput("CONTRADICTION", "max_fps",
+                        "max_fps leaves revisions out, but delivery EVERY "
+                        "sends all: set one of them");
+  }
+  return std::chrono::nanoseconds(std::llround(1e9 / max_fps));
 }
 
 }  // namespace
@@ -69,6 +90,16 @@ absl::StatusOr<FrameFormat> PickFormat(const FrameWishes& wishes,
       absl::StrCat("none of the encodings keeps a tolerance of ", *tolerance,
                    " for a rig of diagonal ", diagonal, ": ", best,
                    "; float32 is exact"));
+}
+
+absl::StatusOr<Subscription> Subscribe(Delivery delivery,
+                                       const FrameWishes& wishes,
+                                       const Rig& rig) {
+  DEFORM_ASSIGN_OR_RETURN(const FrameFormat format, PickFormat(wishes, rig));
+  DEFORM_ASSIGN_OR_RETURN(const auto interval,
+                          IntervalOf(delivery, wishes.max_fps));
+  return Subscription{
+      .delivery = delivery, .format = format, .interval = interval};
 }
 
 }  // namespace deform::server

@@ -1,6 +1,7 @@
 // What a participant says about its frames when it joins, and what it gets.
 #pragma once
 
+#include <chrono>
 #include <optional>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include "core/frames/encoding.h"
 #include "core/mesh/rig.h"
 #include "server/sessions/frame.h"
+#include "server/sessions/outbox.h"
 
 namespace deform::server {
 
@@ -20,6 +22,16 @@ struct FrameWishes {
   // compressed weights, encoding and roundings to float together.
   std::optional<double> tolerance;
   std::optional<double> tolerance_fraction;
+  // Frames a second, at most; 0: as they come.
+  double max_fps = 0;
+};
+
+// What it gets.
+struct Subscription {
+  Delivery delivery = Delivery::kLatest;
+  FrameFormat format;
+  // Between two frames, at least; only with kLatest.
+  std::chrono::nanoseconds interval{0};
 };
 
 // The first or cheapest encoding that keeps the tolerance for the model at
@@ -29,6 +41,13 @@ struct FrameWishes {
 //   TOLERANCE_OUT_OF_RANGE  see CheckTolerance()
 //   TOLERANCE_NOT_MET       by none of the encodings: says what they keep
 absl::StatusOr<FrameFormat> PickFormat(const FrameWishes& wishes,
+                                       const Rig& rig);
+
+// And InvalidArgument:
+//   MAX_FPS_OUT_OF_RANGE
+//   CONTRADICTION           fewer frames than all, and all of them
+absl::StatusOr<Subscription> Subscribe(Delivery delivery,
+                                       const FrameWishes& wishes,
                                        const Rig& rig);
 
 }  // namespace deform::server

@@ -82,6 +82,9 @@ class Outbox {
   // The next frame must wait until one is taken. Only with kEvery.
   bool full() const;
   bool has_frames() const { return !frames_.empty(); }
+  // The next frame is not to wait for anything but room: the stream ends with
+  // it, or it is the first on another rig.
+  bool in_a_hurry() const { return end_ || !announced_.empty(); }
 
   // Frames that are offered from now on are of the changed rig. Needs room for
   // rig changes.

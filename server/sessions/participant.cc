@@ -150,7 +150,9 @@ void Participant::WantKeyframe() {
 void Participant::HalfClose() {
   MutexLock lock(session_->mutex_);
   Outbox* const outbox = session_->audience_.Find(seat_);
-  if (outbox != nullptr) outbox->EndWhenAnswered(absl::OkStatus());
+  if (outbox == nullptr) return;
+  outbox->EndWhenAnswered(absl::OkStatus());
+  session_->Schedule();  // Its last frame does not wait for time to pass.
 }
 
 std::optional<Outgoing> Participant::Take() {

@@ -139,6 +139,7 @@ void Session::Drain(const absl::Status& status) {
     MutexLock lock(mutex_);
     if (!closed_) closed_ = status;
     audience_.EndWhenAnswered(status);
+    Schedule();  // Who waited for time to pass does no longer.
     receivers = audience_.receivers();
   }
   Wake(receivers);
@@ -157,9 +158,10 @@ bool Session::CanMove() const {
 }
 
 void Session::Schedule() {
-  if (scheduled_ || !(CanStep() || CanMove() || audience_.NeedsFrame() ||
-                      refreshed_ != nullptr)) {
-    return;
+  if (scheduled_) return;
+  if (!CanStep() && !CanMove() && refreshed_ == nullptr &&
+      !audience_.NeedsFrame(environment_.clock())) {
+    return CallWhenDue();
   }
   if (weights_ == nullptr) {
     if (waking_) return;
@@ -172,11 +174,12 @@ void Session::Schedule() {
 }
 
 Session::Step Session::BeginStep() {
+  const auto now = environment_.clock();
   Step step{.deformer = deformer_.get()};
   MutexLock lock(mutex_);
   step.binding_id = binding_id_;
   // Who has joined sees the state as it was before anything newer.
-  if (!audience_.MustSeeThis()) {
+  if (!audience_.MustSeeThis(now)) {
     if (refreshed_ != nullptr) {
       step.refreshed = std::move(refreshed_);
     } else if (CanMove()) {
@@ -186,7 +189,7 @@ Session::Step Session::BeginStep() {
       step.pose = queue_.Pop();
     }
   }
-  step.wanted = audience_.Wanted(step.move || step.pose);
+  step.wanted = audience_.Wanted(step.move || step.pose, now);
   return step;
 }
 
@@ -288,7 +291,7 @@ Session::Receivers Session::Publish(Step& step, Frames frames) {
   const bool newer = revision_ != info_.revision;
   revision_ = info_.revision;
   if (newer) Journal(step, before);
-  audience_.Publish(revision_, std::move(frames));
+  audience_.Publish(revision_, std::move(frames), environment_.clock());
   scheduled_ = false;
   Schedule();
   return audience_.receivers();

@@ -51,6 +51,11 @@ struct SessionEnvironment {
   std::chrono::milliseconds stall_timeout{10000};
   // How long the place of a broken stream is kept.
   std::chrono::milliseconds resume_grace{60000};
+  // Calls at that time or soon after, on any thread, never inside the call.
+  // Used once a participant limits its frames.
+  std::function<void(std::chrono::steady_clock::time_point,
+                     std::function<void()>)>
+      call_at = {};
   std::shared_ptr<PointOrders> point_orders = std::make_shared<PointOrders>();
   JournalReport report = {};  // May be empty.
   // What the manager adds. The store of all sessions; null: they are not kept.
@@ -221,6 +226,10 @@ class Session : public std::enable_shared_from_this<Session> {
   bool CanMove() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   bool CanStep() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Schedule() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Has the session called when the interval of a receiver that lacks a frame
+  // is over.
+  void CallWhenDue() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void ServeWhoIsDue(Audience::TimePoint due) ABSL_LOCKS_EXCLUDED(mutex_);
   // What its stream took last, before it is sent.
   void Complete(Outgoing& outgoing) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   static void Wake(const Receivers& receivers);
@@ -262,6 +271,8 @@ class Session : public std::enable_shared_from_this<Session> {
   RigHistory rig_history_ ABSL_GUARDED_BY(mutex_);
   PoseQueue queue_ ABSL_GUARDED_BY(mutex_);
   bool scheduled_ ABSL_GUARDED_BY(mutex_) = false;
+  // When CallWhenDue() will have it called next.
+  std::optional<Audience::TimePoint> called_at_ ABSL_GUARDED_BY(mutex_);
   uint64_t revision_ ABSL_GUARDED_BY(mutex_) = 0;
   Pose pose_ ABSL_GUARDED_BY(mutex_);  // Of the revision.
   std::optional<absl::Status> closed_ ABSL_GUARDED_BY(mutex_);

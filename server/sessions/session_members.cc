@@ -19,8 +19,8 @@ absl::StatusOr<Session::Joined> Session::Join(Delivery delivery,
   const auto join = [&]() -> absl::StatusOr<Joined> {
     MutexLock lock(mutex_);
     if (closed_) return *closed_;
-    DEFORM_ASSIGN_OR_RETURN(const FrameFormat format,
-                            PickFormat(wishes, facts().rig()));
+    DEFORM_ASSIGN_OR_RETURN(const Subscription wanted,
+                            Subscribe(delivery, wishes, facts().rig()));
     DEFORM_RETURN_IF_ERROR(roster_.CheckAttempt(who, now));
     if (const auto before = roster_.SeatOf(who.token)) {
       to_wake = audience_.receivers({&*before, 1});
@@ -42,13 +42,13 @@ absl::StatusOr<Session::Joined> Session::Join(Delivery delivery,
       roster_.Leave(seat, now);
       return from.status();
     }
-    audience_.Add(delivery, format, std::move(receiver), *from);
+    audience_.Add(wanted, std::move(receiver), now, *from);
     const auto others = audience_.receivers(roster_.AwaitingPresence(now));
     to_wake.insert(to_wake.end(), others.begin(), others.end());
     Schedule();
     return Joined{.participant = std::unique_ptr<Participant>(
                       new Participant(shared_from_this(), seat, member->key)),
-                  .format = format,
+                  .format = wanted.format,
                   .state = StateLocked(),
                   .binding = facts(),
                   .pose = pose_,
@@ -98,6 +98,26 @@ void Session::Dismiss(int64_t seat) {
       MakeError(absl::StatusCode::kAborted,
                 "another stream has joined with the token of this one",
                 {.reason = "TAKEN_OVER"});
+}
+
+void Session::CallWhenDue() {
+  const auto due = audience_.NextDue();
+  if (!due || (called_at_ && *called_at_ <= *due)) return;
+  called_at_ = due;
+  environment_.call_at(*due, [weak = weak_from_this(), due = *due] {
+    if (const auto session = weak.lock()) session->ServeWhoIsDue(due);
+  });
+}
+
+void Session::ServeWhoIsDue(Audience::TimePoint due) {
+  Receivers served;
+  {
+    MutexLock lock(mutex_);
+    if (called_at_ == due) called_at_.reset();
+    served = audience_.Serve(environment_.clock());
+    Schedule();
+  }
+  Wake(served);
 }
 
 uint64_t Session::RigChangesFor(const Roster::Member& member) const {

@@ -157,6 +157,69 @@ TEST(Deform, LatestAccountsForWhatItSkips) {
   ExpectBallAt(frame, {0.001 * kPoses, 0, 0});
 }
 
+TEST(Deform, WhoWantsFewFramesGetsTheLastStateToo) {
+  RunningServer server;
+  const std::string session = server.BallSession();
+  auto editor = server.client().Deform(session).value();
+  auto viewer =
+      server.client()
+          .Deform(session, DeformOptions{.max_fps = 20,
+                                         .role = ParticipantRole::kViewer})
+          .value();
+  Frame frame;
+  uint64_t last = 0;
+  for (int i = 1; i <= 50; ++i) {
+    last = editor.Send(MovedBy({0.01 * i, 0, 0})).value();
+  }
+  do {
+    ASSERT_TRUE(editor.NextFrame(frame).ok());
+  } while (frame.answers_sequence < last);
+  const uint64_t revision = frame.revision;
+  uint64_t received = 0, skipped = 0;
+  do {
+    ASSERT_TRUE(viewer.NextFrame(frame).ok());
+    ++received;
+    skipped += frame.skipped_revisions;
+  } while (frame.revision < revision);
+  // With that of the state at joining.
+  EXPECT_EQ(received + skipped, revision + 1);
+  ExpectBallAt(frame, {0.5, 0, 0});
+}
+
+TEST(Deform, ALimitedStreamIsClosedWithoutWaiting) {
+  RunningServer server;
+  // One frame in 100 seconds.
+  auto stream =
+      server.client()
+          .Deform(server.BallSession(), DeformOptions{.max_fps = 0.01})
+          .value();
+  Frame frame;
+  ASSERT_TRUE(stream.NextFrame(frame).ok());
+  const uint64_t sequence = stream.Send(MovedBy({1, 0, 0})).value();
+  stream.Close();
+  ASSERT_TRUE(stream.NextFrame(frame).ok());
+  EXPECT_EQ(frame.answers_sequence, sequence);
+  EXPECT_EQ(stream.NextFrame(frame).code(), absl::StatusCode::kOutOfRange);
+}
+
+TEST(Deform, SaysWhichFrameRatesThereAre) {
+  RunningServer server;
+  const std::string session = server.BallSession();
+  const auto refused = [&](const DeformOptions& options) {
+    return server.client().Deform(session, options).status();
+  };
+  const absl::Status range = refused({.max_fps = -1});
+  EXPECT_EQ(DetailOf(range).reason, "MAX_FPS_OUT_OF_RANGE");
+  EXPECT_THAT(std::string(range.message()),
+              HasSubstr("max_fps is -1, neither 0 nor within 0.01 and 1000"));
+  const absl::Status all =
+      refused({.delivery = Delivery::kEvery, .max_fps = 30});
+  EXPECT_EQ(DetailOf(all).reason, "CONTRADICTION");
+  EXPECT_THAT(std::string(all.message()),
+              HasSubstr("max_fps leaves revisions out, but delivery EVERY "
+                        "sends all: set one of them"));
+}
+
 TEST(Deform, ParticipantsShareTheSession) {
   RunningServer server;
   const std::string session = server.BallSession();

@@ -101,6 +101,15 @@ TEST_F(Load, AnswersEveryPoseWithTheNewestFrameToo) {
   EXPECT_TRUE(ServerIsEmpty());
 }
 
+TEST_F(Load, ViewersMayWantFewFrames) {
+  const Json report = RunJson({"--viewers", "2", "--viewer-fps", "5"});
+  EXPECT_EQ(report["viewer_fps"], 5);
+  EXPECT_EQ(report["poses"]["answered"], report["poses"]["due"]);
+  // A viewer gets one in 200 ms; others come meanwhile.
+  EXPECT_GT(report["skipped_revisions"], 0);
+  EXPECT_TRUE(ServerIsEmpty());
+}
+
 TEST_F(Load, ChecksFramesOfEverySession) {
   const Json report = RunJson({"--sessions", "3"});
   EXPECT_GE(report["checks"]["frames"], 3);

@@ -1,4 +1,5 @@
 // Messages of a Deform stream: any bytes, then what a session makes of them.
+#include <chrono>
 #include <vector>
 
 #include "core/base/error.h"
@@ -66,10 +67,13 @@ void CheckLock(const v1::LockHandles& message) {
 void CheckJoin(const v1::Join& message) {
   const auto join = FromProto(message);
   if (!join.ok()) return CheckRefusal(join.status());
-  const auto format = PickFormat(join->frames, CubeRig());
-  if (!format.ok()) return CheckRefusal(format.status());
-  FUZZ_EXPECT(format->encoding != nullptr);
-  FUZZ_EXPECT(format->encoding->is_exact() == (format->tolerance == 0));
+  const auto wanted = Subscribe(join->delivery, join->frames, CubeRig());
+  if (!wanted.ok()) return CheckRefusal(wanted.status());
+  const FrameFormat& format = wanted->format;
+  FUZZ_EXPECT(format.encoding != nullptr);
+  FUZZ_EXPECT(format.encoding->is_exact() == (format.tolerance == 0));
+  FUZZ_EXPECT(wanted->interval.count() >= 0);
+  FUZZ_EXPECT(wanted->interval <= std::chrono::seconds(100));
   FUZZ_EXPECT(!join->tenant.empty() && !join->session_id.empty());
 }
 

@@ -71,6 +71,10 @@ absl::Status Complete(Options& options) {
       load.frames,
       options.frames.For(options.delivery == "every" ? Delivery::kEvery
                                                      : Delivery::kLatest));
+  if (load.viewer_fps > 0 && options.delivery == "every") {
+    return UsageError(
+        "--viewer-fps leaves frames out: it needs --delivery latest");
+  }
   options.stage.frame_tolerance = options.frames.tolerance;
   options.stage.check = load.check_interval.count() > 0;
   options.stage.editors = load.editors;
@@ -328,6 +332,11 @@ void AddLoadOptions(CLI::App& app, Options& options) {
                  "Of each session: participants that only watch")
       ->check(CLI::Range(0, 256))
       ->capture_default_str();
+  app.add_option("--viewer-fps", load.viewer_fps,
+                 "Frames a second of each viewer, at most; 0: as they come")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str()
+      ->type_name("HZ");
   app.add_option("--rate", load.rate, "Poses a second of each editor")
       ->check(CLI::Range(0.1, 1000.0))
       ->capture_default_str()

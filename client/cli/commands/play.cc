@@ -25,6 +25,7 @@ struct Options {
   std::string motion;
   int64_t frames = 120;
   std::string delivery = "every";
+  double max_fps = 0;
   int in_flight = 4;
   double rate = 0;
   double blend = 1;
@@ -155,10 +156,15 @@ absl::Status Run(const Options& options, Context& context) {
   if (options.poses.empty() == options.motion.empty()) {
     return UsageError("give pose files, or a built-in --motion");
   }
+  const bool every = options.delivery == "every";
+  if (every && options.max_fps > 0) {
+    return UsageError(
+        "--max-fps leaves frames out: it needs --delivery latest");
+  }
   DEFORM_ASSIGN_OR_RETURN(
-      const DeformOptions frames,
-      options.format.For(options.delivery == "every" ? Delivery::kEvery
-                                                     : Delivery::kLatest));
+      DeformOptions frames,
+      options.format.For(every ? Delivery::kEvery : Delivery::kLatest));
+  frames.max_fps = options.max_fps;
   DEFORM_RETURN_IF_ERROR(PrepareDirectory(options.out_dir));
   DEFORM_ASSIGN_OR_RETURN(const std::unique_ptr<Stage> stage,
                           Stage::Open(context, options.stage));
@@ -200,6 +206,12 @@ Action Setup(CLI::App& app) {
                  "poses may merge")
       ->check(CLI::IsMember({"every", "latest"}))
       ->capture_default_str();
+  app.add_option("--max-fps", options->max_fps,
+                 "Frames per second, at most, with --delivery latest; 0: as "
+                 "they come")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str()
+      ->type_name("HZ");
   app.add_option("--in-flight", options->in_flight,
                  "Poses sent ahead of the frames that answer them, at most")
       ->check(CLI::Range(1, 1000))

@@ -75,6 +75,9 @@ INSTANTIATE_TEST_SUITE_P(
          {"--encoding", "morse"},
          "--encoding: there is no 'morse', only auto, float32, quantized16, "
          "predicted"},
+        {"ViewersOfAll",
+         {"--viewers", "1", "--viewer-fps", "10", "--delivery", "every"},
+         "--viewer-fps leaves frames out: it needs --delivery latest"},
         {"LimitWithoutPercentile",
          {"--find-limit"},
          "--find-limit needs the limit, such as --p99 5ms"},

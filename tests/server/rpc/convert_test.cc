@@ -302,6 +302,14 @@ TEST(ConvertJoin, KeepsWhatIsSaidOfTheTolerance) {
   EXPECT_TRUE(FromProto(join)->frames.cheapest);
 }
 
+TEST(ConvertJoin, KeepsHowManyFramesAreWanted) {
+  v1::Join join;
+  join.set_session_id("s");
+  EXPECT_EQ(FromProto(join)->frames.max_fps, 0);
+  join.set_max_fps(30);
+  EXPECT_EQ(FromProto(join)->frames.max_fps, 30);
+}
+
 TEST(ConvertJoin, RefusesWhatItDoesNotKnow) {
   v1::Join join;
   EXPECT_EQ(DetailOf(FromProto(join).status()).field, "session_id");

@@ -8,14 +8,24 @@ namespace {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
+using testing::SizeIs;
 
 class AudienceTest : public testing::Test {
  protected:
   int64_t Add(Delivery delivery = Delivery::kLatest) {
-    return audience_.Add(delivery, float32_, {});
+    return audience_.Add({delivery, float32_}, {}, now_);
+  }
+  // At most ten frames a second.
+  int64_t AddLimited(const FrameFormat& format) {
+    return audience_.Add(
+        {.format = format, .interval = std::chrono::milliseconds(100)}, {},
+        now_);
+  }
+  void Pass(int milliseconds) {
+    now_ += std::chrono::milliseconds(milliseconds);
   }
   int64_t AddOnGrid(Delivery delivery = Delivery::kLatest) {
-    return audience_.Add(delivery, predicted_, {});
+    return audience_.Add({delivery, predicted_}, {}, now_);
   }
   // Makes what is wanted of the revision.
   Frames Made(uint64_t revision, const std::vector<FrameKey>& keys) {
@@ -39,18 +49,20 @@ class AudienceTest : public testing::Test {
     return frames;
   }
   void Publish(uint64_t revision) {
-    audience_.Publish(revision, Made(revision, audience_.Wanted(true)));
+    audience_.Publish(revision, Made(revision, audience_.Wanted(true, now_)),
+                      now_);
   }
   // Frames of the revision for those who lack one.
   void Serve(uint64_t revision) {
-    audience_.Publish(revision, Made(revision, audience_.Wanted(false)));
+    audience_.Publish(revision, Made(revision, audience_.Wanted(false, now_)),
+                      now_);
   }
   FrameToSend TakeFrame(int64_t seat) {
-    return std::get<FrameToSend>(audience_.Take(seat, {}).value());
+    return std::get<FrameToSend>(audience_.Take(seat, now_).value());
   }
   // It has been sent.
   void TakeNothing(int64_t seat) {
-    EXPECT_FALSE(audience_.Take(seat, {}).has_value());
+    EXPECT_FALSE(audience_.Take(seat, now_).has_value());
   }
 
   const FrameFormat float32_{.encoding = FindEncoding("float32")};
@@ -59,17 +71,18 @@ class AudienceTest : public testing::Test {
   const FrameFormat predicted_{.encoding = FindEncoding("predicted"),
                                .tolerance = 0.1};
   Audience audience_;
+  Audience::TimePoint now_{};
 };
 
 TEST_F(AudienceTest, GivesWhoComesFirstNothingUntilThereIsAFrame) {
   const int64_t seat = Add();
-  EXPECT_TRUE(audience_.NeedsFrame());
-  EXPECT_TRUE(audience_.MustSeeThis());
-  EXPECT_THAT(audience_.Wanted(false), ElementsAre(FrameKey{float32_}));
+  EXPECT_TRUE(audience_.NeedsFrame(now_));
+  EXPECT_TRUE(audience_.MustSeeThis(now_));
+  EXPECT_THAT(audience_.Wanted(false, now_), ElementsAre(FrameKey{float32_}));
   TakeNothing(seat);
   Publish(0);
-  EXPECT_FALSE(audience_.NeedsFrame());
-  EXPECT_THAT(audience_.Wanted(false), IsEmpty());
+  EXPECT_FALSE(audience_.NeedsFrame(now_));
+  EXPECT_THAT(audience_.Wanted(false, now_), IsEmpty());
   EXPECT_EQ(TakeFrame(seat).frame->info.revision, 0u);
 }
 
@@ -77,28 +90,30 @@ TEST_F(AudienceTest, GivesWhoComesLaterThePresentFrame) {
   Add();
   Publish(7);
   const int64_t late = Add();
-  EXPECT_FALSE(audience_.NeedsFrame());
+  EXPECT_FALSE(audience_.NeedsFrame(now_));
   EXPECT_EQ(TakeFrame(late).frame->info.revision, 7u);
 }
 
 TEST_F(AudienceTest, AsksForAFormatThatIsNotThereYet) {
   Add();
   Publish(1);
-  const std::vector<FrameKey> before = audience_.Wanted(true);
-  const int64_t other = audience_.Add(Delivery::kLatest, quantized16_, {});
-  EXPECT_THAT(audience_.Wanted(false), ElementsAre(FrameKey{quantized16_}));
+  const std::vector<FrameKey> before = audience_.Wanted(true, now_);
+  const int64_t other =
+      audience_.Add({Delivery::kLatest, quantized16_}, {}, now_);
+  EXPECT_THAT(audience_.Wanted(false, now_),
+              ElementsAre(FrameKey{quantized16_}));
   // It has come while the next revision was encoded.
-  audience_.Publish(2, Made(2, before));
-  EXPECT_TRUE(audience_.MustSeeThis());
+  audience_.Publish(2, Made(2, before), now_);
+  EXPECT_TRUE(audience_.MustSeeThis(now_));
   Serve(2);
-  EXPECT_FALSE(audience_.NeedsFrame());
+  EXPECT_FALSE(audience_.NeedsFrame(now_));
   EXPECT_EQ(TakeFrame(other).frame->info.revision, 2u);
 }
 
 TEST_F(AudienceTest, WantsEachFrameOnce) {
   Add();
   Add();
-  EXPECT_THAT(audience_.Wanted(true), ElementsAre(FrameKey{float32_}));
+  EXPECT_THAT(audience_.Wanted(true, now_), ElementsAre(FrameKey{float32_}));
 }
 
 TEST_F(AudienceTest, PublishingARevisionAgainSendsItOnce) {
@@ -138,13 +153,13 @@ TEST_F(AudienceTest, ServesABusyReceiverOnAGridWhenItHasTime) {
   TakeFrame(slow);
   for (uint64_t r = 2; r <= 9; ++r) {
     // Nothing is made for it, and it holds nobody up.
-    EXPECT_THAT(audience_.Wanted(true), IsEmpty());
+    EXPECT_THAT(audience_.Wanted(true, now_), IsEmpty());
     Publish(r);
-    EXPECT_FALSE(audience_.NeedsFrame());
+    EXPECT_FALSE(audience_.NeedsFrame(now_));
   }
   TakeNothing(slow);
-  EXPECT_TRUE(audience_.NeedsFrame());
-  EXPECT_FALSE(audience_.MustSeeThis());
+  EXPECT_TRUE(audience_.NeedsFrame(now_));
+  EXPECT_FALSE(audience_.MustSeeThis(now_));
   Serve(9);
   const FrameToSend sent = TakeFrame(slow);
   EXPECT_EQ(sent.frame->info.revision, 9u);
@@ -160,15 +175,29 @@ TEST_F(AudienceTest, ReceiversWithTheSameReferenceShareAFrame) {
   for (const int64_t seat : {quick, other, slow}) TakeFrame(seat);
   for (const int64_t seat : {quick, other}) TakeNothing(seat);
   Publish(2);
-  EXPECT_EQ(TakeFrame(quick).frame, TakeFrame(other).frame);
-  for (const int64_t seat : {quick, other, slow}) TakeNothing(seat);
+  const auto second = TakeFrame(quick).frame;
+  EXPECT_EQ(TakeFrame(other).frame, second);
+  for (const int64_t seat : {quick, other}) TakeNothing(seat);
   Publish(3);
-  const auto predicted = TakeFrame(quick).frame;
+  const auto third = TakeFrame(quick).frame;
+  EXPECT_EQ(third->reference_revision, 2u);
+  EXPECT_EQ(TakeFrame(other).frame, third);
+  // Its reference is another by now.
+  TakeNothing(slow);
+  Serve(3);
   const auto late = TakeFrame(slow).frame;
-  EXPECT_EQ(predicted->reference_revision, 2u);
   EXPECT_EQ(late->reference_revision, 1u);
-  EXPECT_EQ(TakeFrame(other).frame, predicted);
-  EXPECT_EQ(late->grid, predicted->grid);
+  EXPECT_EQ(late->info.revision, 3u);
+}
+
+TEST_F(AudienceTest, WhoBecomesFreeGetsAFrameThatIsThere) {
+  const int64_t quick = AddOnGrid();
+  const int64_t slow = AddOnGrid();
+  Publish(1);
+  for (const int64_t seat : {quick, slow}) TakeFrame(seat);
+  TakeNothing(quick);
+  Publish(2);
+  EXPECT_EQ(TakeFrame(slow).frame, TakeFrame(quick).frame);
 }
 
 TEST_F(AudienceTest, AFrameOfFloatsIsNoReference) {
@@ -178,7 +207,7 @@ TEST_F(AudienceTest, AFrameOfFloatsIsNoReference) {
   TakeNothing(seat);
   auto floats = std::make_shared<Frame>();
   floats->info.revision = 2;
-  audience_.Publish(2, {{audience_.Wanted(true).front(), floats}});
+  audience_.Publish(2, {{audience_.Wanted(true, now_).front(), floats}}, now_);
   EXPECT_EQ(TakeFrame(seat).frame, floats);
   TakeNothing(seat);
   Publish(3);
@@ -190,10 +219,7 @@ TEST_F(AudienceTest, GivesAKeyframeToWhoAsksForOne) {
   Publish(1);
   TakeFrame(seat);
   audience_.WantKeyframe(seat);
-  EXPECT_FALSE(audience_.NeedsFrame());  // Not while the last is under way.
-  TakeNothing(seat);
-  EXPECT_TRUE(audience_.NeedsFrame());
-  Serve(1);
+  EXPECT_FALSE(audience_.NeedsFrame(now_));  // Not while the last is under way.
   const FrameToSend again = TakeFrame(seat);
   EXPECT_EQ(again.frame->info.revision, 1u);
   EXPECT_EQ(again.frame->reference_revision, std::nullopt);
@@ -203,15 +229,90 @@ TEST_F(AudienceTest, GivesAKeyframeToWhoAsksForOne) {
 TEST_F(AudienceTest, AFrameThatRefersToWhatWasLostIsNotSent) {
   const int64_t seat = AddOnGrid(Delivery::kEvery);
   Publish(1);
-  const std::vector<FrameKey> before = audience_.Wanted(true);
+  const std::vector<FrameKey> before = audience_.Wanted(true, now_);
   audience_.WantKeyframe(seat);
-  audience_.Publish(2, Made(2, before));
-  EXPECT_TRUE(audience_.MustSeeThis());
+  audience_.Publish(2, Made(2, before), now_);
+  EXPECT_TRUE(audience_.MustSeeThis(now_));
   Serve(2);
   EXPECT_EQ(TakeFrame(seat).frame->info.revision, 1u);
   const FrameToSend sent = TakeFrame(seat);
   EXPECT_EQ(sent.frame->info.revision, 2u);
   EXPECT_EQ(sent.frame->reference_revision, std::nullopt);
+}
+
+TEST_F(AudienceTest, WhoWantsFewFramesGetsTheNewestWhenTheIntervalIsOver) {
+  for (const FrameFormat& format : {float32_, predicted_}) {
+    const int64_t seat = AddLimited(format);
+    Publish(1);
+    EXPECT_EQ(TakeFrame(seat).frame->info.revision, 1u);
+    TakeNothing(seat);
+    Pass(60);
+    for (const uint64_t r : {2, 3}) {
+      // None is made for it, and it holds nobody up.
+      EXPECT_THAT(audience_.Wanted(true, now_), IsEmpty());
+      Publish(r);
+      EXPECT_FALSE(audience_.NeedsFrame(now_));
+    }
+    TakeNothing(seat);
+    Pass(40);
+    EXPECT_EQ(audience_.NextDue(), now_);
+    EXPECT_TRUE(audience_.NeedsFrame(now_));
+    EXPECT_FALSE(audience_.MustSeeThis(now_));
+    Serve(3);
+    EXPECT_EQ(audience_.NextDue(), std::nullopt);
+    const FrameToSend sent = TakeFrame(seat);
+    EXPECT_EQ(sent.frame->info.revision, 3u);
+    EXPECT_EQ(sent.skipped_revisions, 1u);
+    audience_.Remove(seat);
+    Publish(0);
+  }
+}
+
+TEST_F(AudienceTest, WhoWantsFewFramesSharesThoseOfOthers) {
+  const int64_t few = AddLimited(float32_);
+  const int64_t all = Add();
+  Publish(1);
+  TakeFrame(few);
+  TakeNothing(few);
+  Publish(2);
+  EXPECT_THAT(audience_.Serve(now_), IsEmpty());
+  Pass(100);
+  EXPECT_THAT(audience_.Serve(now_), SizeIs(1));
+  EXPECT_EQ(TakeFrame(few).frame, TakeFrame(all).frame);
+  EXPECT_THAT(audience_.Serve(now_), IsEmpty());
+}
+
+TEST_F(AudienceTest, WhoWantsFewFramesGetsNoneWhileOneIsUnderWay) {
+  const int64_t few = AddLimited(float32_);
+  const int64_t all = Add();
+  Publish(1);
+  TakeFrame(few);
+  Pass(500);
+  Publish(2);
+  EXPECT_EQ(audience_.NextDue(), std::nullopt);
+  Publish(3);
+  // Then it is there at once, and the interval begins anew.
+  EXPECT_EQ(TakeFrame(few).frame, TakeFrame(all).frame);
+  TakeNothing(few);
+  Publish(4);
+  EXPECT_EQ(audience_.NextDue(), now_ + std::chrono::milliseconds(100));
+}
+
+TEST_F(AudienceTest, AFrameOnAnotherRigOrOneThatEndsTheStreamDoesNotWait) {
+  const int64_t seat = AddLimited(float32_);
+  Publish(1);
+  TakeFrame(seat);
+  TakeNothing(seat);
+  audience_.Announce(nullptr);
+  Publish(2);
+  EXPECT_TRUE(std::holds_alternative<RigChanged>(*audience_.Take(seat, now_)));
+  EXPECT_EQ(TakeFrame(seat).frame->info.revision, 2u);
+  TakeNothing(seat);
+  Publish(3);
+  EXPECT_FALSE(audience_.NeedsFrame(now_));
+  audience_.Find(seat)->Expect(1);
+  audience_.EndWhenAnswered(absl::OkStatus());
+  EXPECT_TRUE(audience_.NeedsFrame(now_));
 }
 
 TEST_F(AudienceTest, HasRoomAsLongAsEverybodyHas) {

@@ -72,6 +72,57 @@ TEST(PickFormat, ReceiversOfFloatsShareWhateverTheirTolerance) {
             Pick({}).value());
 }
 
+TEST(Subscribe, FramesASecondAreAnInterval) {
+  const Rig rig = BallCage();
+  const auto interval = [&](double max_fps) {
+    return Subscribe(Delivery::kLatest, {.max_fps = max_fps}, rig)->interval;
+  };
+  EXPECT_EQ(interval(0), std::chrono::nanoseconds(0));
+  EXPECT_EQ(interval(30), std::chrono::nanoseconds(33'333'333));
+  EXPECT_EQ(interval(1000), std::chrono::milliseconds(1));
+  EXPECT_EQ(interval(0.01), std::chrono::seconds(100));
+  EXPECT_EQ(Subscribe(Delivery::kEvery, {}, rig)->delivery, Delivery::kEvery);
+}
+
+struct BadRate {
+  std::string name;
+  Delivery delivery;
+  double max_fps;
+  std::string reason;
+  std::string message;
+};
+class SubscribeRefuses : public testing::TestWithParam<BadRate> {};
+
+TEST_P(SubscribeRefuses, BadRates) {
+  const absl::Status status =
+      Subscribe(GetParam().delivery, {.max_fps = GetParam().max_fps},
+                Rig(BallCage()))
+          .status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(DetailOf(status).reason, GetParam().reason);
+  EXPECT_EQ(DetailOf(status).field, "max_fps");
+  EXPECT_EQ(std::string(status.message()), GetParam().message);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Rates, SubscribeRefuses,
+    testing::ValuesIn<BadRate>({
+        {"Negative", Delivery::kLatest, -1, "MAX_FPS_OUT_OF_RANGE",
+         "max_fps is -1, neither 0 nor within 0.01 and 1000"},
+        {"TooMany", Delivery::kLatest, 1001, "MAX_FPS_OUT_OF_RANGE",
+         "max_fps is 1001, neither 0 nor within 0.01 and 1000"},
+        {"TooFew", Delivery::kLatest, 1e-300, "MAX_FPS_OUT_OF_RANGE",
+         "max_fps is 1e-300, neither 0 nor within 0.01 and 1000"},
+        {"NotANumber", Delivery::kLatest, NAN, "MAX_FPS_OUT_OF_RANGE",
+         "max_fps is nan, neither 0 nor within 0.01 and 1000"},
+        {"Infinite", Delivery::kLatest, INFINITY, "MAX_FPS_OUT_OF_RANGE",
+         "max_fps is inf, neither 0 nor within 0.01 and 1000"},
+        {"OfAll", Delivery::kEvery, 30, "CONTRADICTION",
+         "max_fps leaves revisions out, but delivery EVERY sends all: set one "
+         "of them"},
+    }),
+    [](const auto& test) { return test.param.name; });
+
 struct BadWishes {
   std::string name;
   FrameWishes wishes;

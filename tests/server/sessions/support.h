@@ -6,6 +6,7 @@
 #include <deque>
 #include <functional>
 #include <future>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -49,13 +50,31 @@ class ManualExecutor {
 
 class ManualClock {
  public:
+  using TimePoint = std::chrono::steady_clock::time_point;
+
   Clock clock() {
     return [this] { return now_; };
   }
-  void Advance(std::chrono::milliseconds time) { now_ += time; }
+  // As SessionEnvironment::call_at.
+  std::function<void(TimePoint, std::function<void()>)> call_at() {
+    return [this](TimePoint time, std::function<void()> task) {
+      calls_.emplace(time, std::move(task));
+    };
+  }
+  // And makes the calls that are due then.
+  void Advance(std::chrono::milliseconds time) {
+    now_ += time;
+    while (!calls_.empty() && calls_.begin()->first <= now_) {
+      const auto task = std::move(calls_.begin()->second);
+      calls_.erase(calls_.begin());
+      task();
+    }
+  }
+  size_t waiting_calls() const { return calls_.size(); }
 
  private:
-  std::chrono::steady_clock::time_point now_{};
+  TimePoint now_{};
+  std::multimap<TimePoint, std::function<void()>> calls_;
 };
 
 class CountingReceiver : public Receiver {
@@ -125,7 +144,8 @@ class SessionRooms {
     return {.scheduler = &scheduler,
             .clock = clock.clock(),
             .max_participants = 3,
-            .stall_timeout = std::chrono::seconds(10)};
+            .stall_timeout = std::chrono::seconds(10),
+            .call_at = clock.call_at()};
   }
   BindingRegistry& bindings() { return bindings_; }
 

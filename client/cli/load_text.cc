@@ -67,6 +67,14 @@ Json ChecksJson(const LoadSubject& subject, const LoadReport& report) {
   return json;
 }
 
+Json ClientJson(const LoadReport& report) {
+  return {{"kept_schedule", report.kept_schedule()},
+          {"late_part", report.LatePart()},
+          {"lateness_ms", LatencyJson(report.figures.lateness)},
+          {"held_back", report.figures.held_back},
+          {"processors_used", report.client_cpus}};
+}
+
 double BytesPerFrame(const LoadFigures& figures) {
   return static_cast<double>(figures.bytes) /
          static_cast<double>(std::max<int64_t>(1, figures.frames));
@@ -142,6 +150,7 @@ Json ToJson(const LoadSubject& subject, const LoadReport& report) {
           {"bytes", figures.bytes},
           {"bytes_per_frame", BytesPerFrame(figures)},
           {"frame_tolerance", options.frames.tolerance_fraction.value_or(0)},
+          {"normals", options.frames.normals},
           {"bytes_per_second", PerSecond(figures.bytes, report.seconds)},
           {"skipped_revisions", figures.skipped},
           {"deform_us_mean",
@@ -152,12 +161,7 @@ Json ToJson(const LoadSubject& subject, const LoadReport& report) {
             {"processors", report.server_processors},
             {"resident_bytes_begin", report.server_resident_begin},
             {"resident_bytes_peak", report.server_resident_peak}}},
-          {"client",
-           {{"kept_schedule", report.kept_schedule()},
-            {"late_part", report.LatePart()},
-            {"lateness_ms", LatencyJson(figures.lateness)},
-            {"held_back", figures.held_back},
-            {"processors_used", report.client_cpus}}},
+          {"client", ClientJson(report)},
           {"checks", ChecksJson(subject, report)}};
 }
 

@@ -105,6 +105,7 @@ struct Client::Impl {
     join.set_name(wanted.name);
     join.set_presence(wanted.on_participants != nullptr);
     join.set_max_fps(wanted.max_fps);
+    join.set_normals(wanted.normals);
     if (wanted.tolerance) join.set_tolerance(*wanted.tolerance);
     if (wanted.tolerance_fraction) {
       join.set_tolerance_fraction(*wanted.tolerance_fraction);

@@ -26,7 +26,7 @@ class Call final
  public:
   Call(v1::SessionService::Stub& stub, const v1::Join& join,
        DeformEvents& events)
-      : events_(events) {
+      : events_(events), normals_(join.normals()) {
     MutexLock lock(mutex_);  // What is set up here is seen by reactions.
     stub.async()->Deform(&context_, this);
     *request_.mutable_join() = join;
@@ -134,7 +134,7 @@ class Call final
   absl::Status HandleJoined() {
     DEFORM_ASSIGN_OR_RETURN(const JoinedSession joined,
                             FromProto(response_.joined()));
-    assembler_.emplace(joined.dimension, joined.point_count);
+    assembler_.emplace(joined.dimension, joined.point_count, normals_);
     {
       MutexLock lock(mutex_);
       dimension_ = joined.dimension;
@@ -164,6 +164,7 @@ class Call final
   }
 
   DeformEvents& events_;
+  const bool normals_;  // Were asked for.
   grpc::ClientContext context_;
 
   // The reading side's. Its reactions come one after the other, on any thread;

@@ -67,6 +67,9 @@ struct DeformOptions {
   // With kLatest, frames a second at most, 0.01 to 1000; 0: as they come. The
   // last state always comes.
   double max_fps = 0;
+  // Frames come with Frame::normals; FailedPrecondition NO_NORMALS if the model
+  // has no faces, or two dimensions.
+  bool normals = false;
 
   ParticipantRole role = ParticipantRole::kEditor;
   std::string name;  // Shown to others; at most 64 bytes.
@@ -104,6 +107,10 @@ struct Frame {
   // N x dimension, relative to `origin`.
   std::vector<float> positions;
   Vec3 origin = Vec3::Zero();
+  // If they were asked for: N x 3, unit normals of the deformed faces around
+  // each vertex, weighted by area, within a degree; (0, 0, 1) where there is no
+  // area.
+  std::vector<float> normals;
   // Revisions not delivered since the frame before.
   uint64_t skipped_revisions = 0;
   // Weight columns that deforming applied.

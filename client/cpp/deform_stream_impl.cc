@@ -204,7 +204,7 @@ absl::Status DeformStream::Impl::TryToReconnect() {
 absl::Status DeformStream::Impl::Adopt(std::shared_ptr<DeformLink> link,
                                        const v1::Joined& joined) {
   reader_ = link;
-  assembler_.emplace(joined_.dimension, joined_.point_count);
+  assembler_.emplace(joined_.dimension, joined_.point_count, options_.normals);
   may_repeat_ = last_revision_.has_value();
   join_.mutable_resume()->set_token(joined.resume_token());
   known_.clear();

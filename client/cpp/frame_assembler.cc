@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
+#include "core/frames/normals.h"
 
 namespace deform {
 namespace {
@@ -68,6 +69,7 @@ absl::Status FrameAssembler::Begin(const v1::FrameChunk& chunk, Frame& frame) {
   frame.dimension = dimension_;
   frame.origin = origin_;
   frame.positions.resize(point_count_ * dimension_);
+  frame.normals.resize(normals_ ? 3 * point_count_ : 0);
   frame.skipped_revisions = chunk.skipped_revisions();
   frame.columns_applied = chunk.columns_applied();
   frame.exit_mismatch = chunk.exit_mismatch();
@@ -124,8 +126,10 @@ absl::StatusOr<bool> FrameAssembler::Add(const v1::FrameChunk& chunk,
                     " on, ", chunk.vertex_count(), " of them, where ",
                     next_vertex_, " of ", point_count_, " were reached");
   }
+  DEFORM_RETURN_IF_ERROR(ReadNormals(chunk, frame));
   DEFORM_RETURN_IF_ERROR(Decode(chunk, frame));
-  frame.bytes += static_cast<int64_t>(chunk.data().size());
+  frame.bytes +=
+      static_cast<int64_t>(chunk.data().size() + chunk.normals().size());
   next_vertex_ += static_cast<int64_t>(chunk.vertex_count());
   if (!chunk.last()) return false;
   if (next_vertex_ != point_count_) {
@@ -150,6 +154,18 @@ absl::Status FrameAssembler::Decode(const v1::FrameChunk& chunk, Frame& frame) {
             .subspan(next_vertex_ * dimension_, count * dimension_);
   }
   return encoding_->Decode(BytesOf(chunk.data()), target);
+}
+
+absl::Status FrameAssembler::ReadNormals(const v1::FrameChunk& chunk,
+                                         Frame& frame) const {
+  if (normals_) {
+    return DecodeNormals(
+        BytesOf(chunk.normals()),
+        std::span<float>(frame.normals)
+            .subspan(3 * next_vertex_, 3 * chunk.vertex_count()));
+  }
+  if (chunk.normals().empty()) return absl::OkStatus();
+  return BadFrame("a chunk has normals, which were not asked for");
 }
 
 void FrameAssembler::FinishOnGrid(Frame& frame) {

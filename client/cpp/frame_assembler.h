@@ -21,8 +21,9 @@ namespace deform {
 // thread-safe.
 class FrameAssembler {
  public:
-  FrameAssembler(int dimension, int64_t point_count)
-      : dimension_(dimension), point_count_(point_count) {}
+  // `normals`: frames have them.
+  FrameAssembler(int dimension, int64_t point_count, bool normals = false)
+      : dimension_(dimension), point_count_(point_count), normals_(normals) {}
 
   // Adds a chunk to `frame`, the same for all chunks of a frame. True if it
   // completed it. Chunks come from outside: InvalidArgument (BAD_FRAME) if they
@@ -44,10 +45,12 @@ class FrameAssembler {
   absl::Status BeginOnGrid(const v1::FrameChunk& chunk);
   absl::Status CheckFollows(const v1::FrameChunk& chunk) const;
   absl::Status Decode(const v1::FrameChunk& chunk, Frame& frame);
+  absl::Status ReadNormals(const v1::FrameChunk& chunk, Frame& frame) const;
   void FinishOnGrid(Frame& frame);
 
   const int dimension_;
   const int64_t point_count_;
+  const bool normals_;
   uint64_t newest_epoch_ = 0;
   bool have_origin_ = false;
   Vec3 origin_ = Vec3::Zero();

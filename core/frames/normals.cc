@@ -16,14 +16,17 @@ namespace {
 constexpr float kLargest = 127;
 
 // The lower half of the octahedron, folded over the upper, and back.
-void Fold(float& x, float& y) {
-  const float folded = (1 - std::abs(y)) * (x < 0 ? -1.0F : 1.0F);
-  y = (1 - std::abs(x)) * (y < 0 ? -1.0F : 1.0F);
+template <typename Real>
+void Fold(Real& x, Real& y) {
+  const Real folded = (1 - std::abs(y)) * (x < 0 ? Real{-1} : Real{1});
+  y = (1 - std::abs(x)) * (y < 0 ? Real{-1} : Real{1});
   x = folded;
 }
 
-uint8_t ToByte(float p) {
-  return static_cast<uint8_t>(static_cast<int8_t>(std::lround(p * kLargest)));
+uint8_t ToByte(double p) {
+  // Rounded as by lround(), which is a call.
+  const auto i = static_cast<int>(p * kLargest + (p < 0 ? -0.5 : 0.5));
+  return static_cast<uint8_t>(static_cast<int8_t>(i));
 }
 
 float FromByte(uint8_t byte) {
@@ -60,21 +63,24 @@ void ComputeNormals(std::span<const float> positions, const Faces& faces,
   }
 }
 
+void EncodeNormal(const Vec3& direction, uint8_t* bytes) {
+  const double length =
+      std::abs(direction[0]) + std::abs(direction[1]) + std::abs(direction[2]);
+  if (!(length > 0 && std::isfinite(length))) {
+    bytes[0] = bytes[1] = 0;
+    return;
+  }
+  double x = direction[0] / length, y = direction[1] / length;
+  if (direction[2] < 0) Fold(x, y);
+  bytes[0] = ToByte(x);
+  bytes[1] = ToByte(y);
+}
+
 void EncodeNormals(std::span<const float> normals, std::span<uint8_t> bytes) {
   assert(normals.size() / 3 == bytes.size() / 2);
   for (size_t i = 0; i < normals.size() / 3; ++i) {
-    float x = normals[3 * i], y = normals[3 * i + 1];
-    const float z = normals[3 * i + 2];
-    const float length = std::abs(x) + std::abs(y) + std::abs(z);
-    if (!(length > 0 && std::isfinite(length))) {
-      bytes[2 * i] = bytes[2 * i + 1] = 0;
-      continue;
-    }
-    x /= length;
-    y /= length;
-    if (z < 0) Fold(x, y);
-    bytes[2 * i] = ToByte(x);
-    bytes[2 * i + 1] = ToByte(y);
+    EncodeNormal({normals[3 * i], normals[3 * i + 1], normals[3 * i + 2]},
+                 bytes.data() + 2 * i);
   }
 }
 

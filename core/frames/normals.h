@@ -26,14 +26,19 @@
 
 namespace deform {
 
+inline constexpr int64_t kNormalBytes = 2;
+
 // Unit normals of N vertices at `positions` (N x 3), N x 3: of the faces
 // (F x 3) around each, weighted by their areas. Faces without area add nothing;
-// where nothing is left, as for a vertex without faces, it is (0, 0, 1).
+// where nothing is left, as for a vertex without faces, it is (0, 0, 1). The
+// plain way; see vertex_fans.h.
 void ComputeNormals(std::span<const float> positions, const Faces& faces,
                     std::span<float> normals);
 
-// N x 3 to 2 N bytes. Any numbers give bytes; (0, 0, 0) and what is not finite
-// those of (0, 0, 1).
+// A direction of any length to two bytes. Any numbers give bytes; (0, 0, 0) and
+// what is not finite those of (0, 0, 1).
+void EncodeNormal(const Vec3& direction, uint8_t* bytes);
+// N x 3 to 2 N bytes, likewise.
 void EncodeNormals(std::span<const float> normals, std::span<uint8_t> bytes);
 
 // InvalidArgument (BAD_FRAME) unless there are 2 bytes for each of N normals.

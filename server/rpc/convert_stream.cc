@@ -29,6 +29,7 @@ absl::Status ReadWishes(const v1::Join& join, FrameWishes& wishes) {
   }
   wishes.cheapest = join.cheapest_encoding();
   wishes.max_fps = join.max_fps();
+  wishes.normals = join.normals();
   if (join.has_tolerance()) wishes.tolerance = join.tolerance();
   if (join.has_tolerance_fraction()) {
     wishes.tolerance_fraction = join.tolerance_fraction();

@@ -5,7 +5,9 @@
 #include <limits>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "core/frames/normals.h"
 #include "deform/v1/session.pb.h"
 #include "google/protobuf/io/coded_stream.h"
 #include "grpcpp/support/slice.h"
@@ -66,35 +68,60 @@ void AppendTag(uint32_t field, size_t length, std::string& out) {
   coded.WriteVarint32(static_cast<uint32_t>(length));
 }
 
+// A field of bytes that is not copied.
+struct BytesField {
+  uint32_t number;
+  const void* data;
+  int64_t size;
+  std::shared_ptr<const void> keep;
+};
+
+grpc::Slice SliceOf(BytesField field) {
+  using Kept = std::shared_ptr<const void>;
+  return grpc::Slice(
+      const_cast<void*>(field.data), field.size,
+      [](void* kept) { delete static_cast<Kept*>(kept); },
+      new Kept(std::move(field.keep)));
+}
+
 // The message of field `field` whose first fields are `inner`, and whose last
-// is `data`, field `data_field`, which is not copied and is kept by `keep`.
-template <typename Kept>
-grpc::ByteBuffer MessageAround(uint32_t field, std::string inner,
-                               uint32_t data_field, const void* data,
-                               int64_t size, std::shared_ptr<Kept> keep) {
-  AppendTag(data_field, size, inner);
+// are `bytes`, at least one.
+grpc::ByteBuffer MessageAround(uint32_t field, const std::string& inner,
+                               std::vector<BytesField> bytes) {
+  std::vector<std::string> tags;
+  size_t size = inner.size();
+  for (const BytesField& one : bytes) {
+    AppendTag(one.number, one.size, tags.emplace_back());
+    size += tags.back().size() + one.size;
+  }
   std::string header;
-  AppendTag(field, inner.size() + size, header);
-  header += inner;
-  const grpc::Slice slices[2] = {
-      grpc::Slice(header),
-      grpc::Slice(
-          const_cast<void*>(data), size,
-          [](void* kept) { delete static_cast<std::shared_ptr<Kept>*>(kept); },
-          new std::shared_ptr<Kept>(std::move(keep)))};
-  return grpc::ByteBuffer(slices, 2);
+  AppendTag(field, size, header);
+  tags.front().insert(0, header + inner);
+  std::vector<grpc::Slice> slices;
+  for (size_t i = 0; i < bytes.size(); ++i) {
+    slices.emplace_back(tags[i]);
+    slices.push_back(SliceOf(std::move(bytes[i])));
+  }
+  return {slices.data(), slices.size()};
 }
 
 }  // namespace
 
 grpc::ByteBuffer FrameMessage(const FrameToSend& send, size_t chunk,
                               uint64_t epoch, uint64_t durable_revision) {
-  const Frame::Chunk& data = send.frame->chunks[chunk];
+  const Frame::Chunk& part = send.frame->chunks[chunk];
+  std::vector<BytesField> bytes;
+  if (send.normals != nullptr) {
+    bytes.push_back({v1::FrameChunk::kNormalsFieldNumber,
+                     send.normals->data() + kNormalBytes * part.first_vertex,
+                     kNormalBytes * part.vertex_count, send.normals});
+  }
+  bytes.push_back({v1::FrameChunk::kDataFieldNumber, part.bytes.get(),
+                   part.size, send.frame});
   return MessageAround(
       v1::DeformResponse::kFrameFieldNumber,
       ChunkHeader(send, chunk, epoch, durable_revision).SerializeAsString(),
-      v1::FrameChunk::kDataFieldNumber, data.bytes.get(), data.size,
-      send.frame);
+      std::move(bytes));
 }
 
 size_t OrderMessages(const PointOrder& order) {
@@ -109,8 +136,8 @@ grpc::ByteBuffer OrderMessage(const std::shared_ptr<const PointOrder>& order,
   header.set_first(first);
   return MessageAround(
       v1::DeformResponse::kPointOrderFieldNumber, header.SerializeAsString(),
-      v1::PointOrderChunk::kDataFieldNumber, order->points().data() + first,
-      count * int64_t{sizeof(int32_t)}, order);
+      {{v1::PointOrderChunk::kDataFieldNumber, order->points().data() + first,
+        count * int64_t{sizeof(int32_t)}, order}});
 }
 
 }  // namespace deform::server

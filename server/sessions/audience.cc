@@ -17,6 +17,7 @@ int64_t Audience::Add(const Subscription& wanted,
                       const Rejoining& from) {
   Seat seat{.outbox = Outbox(wanted.delivery),
             .format = wanted.format,
+            .normals = wanted.normals,
             .interval = wanted.interval,
             .receiver = std::move(receiver)};
   seat.contained = from.contained;
@@ -72,11 +73,21 @@ bool Audience::MustSeeThis(TimePoint now) const {
 std::vector<FrameKey> Audience::Wanted(bool by_all, TimePoint now) const {
   std::set<FrameKey> wanted;
   for (const auto& [number, seat] : seats_) {
-    if (by_all ? seat.CanBeServed(now) : seat.LacksFrame(now)) {
+    if (by_all ? seat.CanBeServed(now)
+               : seat.LacksFrame(now) && !frames_.contains(seat.key())) {
       wanted.insert(seat.key());
     }
   }
   return {wanted.begin(), wanted.end()};
+}
+
+bool Audience::WantsNormals(bool by_all, TimePoint now) const {
+  if (!by_all && normals_ != nullptr) return false;
+  return std::any_of(seats_.begin(), seats_.end(), [&](const auto& entry) {
+    const Seat& seat = entry.second;
+    return seat.normals &&
+           (by_all ? seat.CanBeServed(now) : seat.LacksFrame(now));
+  });
 }
 
 std::optional<Audience::TimePoint> Audience::NextDue() const {
@@ -99,11 +110,16 @@ void Audience::Announce(const std::shared_ptr<const RigChange>& change) {
   for (auto& [number, seat] : seats_) seat.outbox.Announce(change);
 }
 
-void Audience::Publish(uint64_t revision, Frames frames, TimePoint now) {
+void Audience::Publish(uint64_t revision, Frames frames, TimePoint now,
+                       std::shared_ptr<const FrameNormals> normals) {
   const bool newer = revision != revision_;
-  if (newer) frames_.clear();
+  if (newer) {
+    frames_.clear();
+    normals_.reset();
+  }
   revision_ = revision;
   frames_.merge(frames);
+  if (normals != nullptr) normals_ = std::move(normals);
   for (auto& [number, seat] : seats_) {
     if (newer) seat.needs_frame = true;
     Serve(seat, now);
@@ -123,8 +139,9 @@ bool Audience::Serve(Seat& seat, TimePoint now) {
   const auto found = frames_.find(seat.key());
   // Who joined while frames were made may want one that nobody asked for.
   if (found == frames_.end()) return false;
+  if (seat.normals && normals_ == nullptr) return false;
   const std::shared_ptr<const Frame>& frame = found->second;
-  seat.outbox.Offer(frame, seat.contained);
+  seat.outbox.Offer(frame, seat.contained, seat.normals ? normals_ : nullptr);
   if (frame->grid != nullptr) seat.held = frame->grid;
   seat.needs_frame = false;
   seat.offered_any = true;

@@ -73,8 +73,10 @@ class Audience {
   bool NeedsFrame(TimePoint now) const;
   // And must see this one: a next revision would come too early.
   bool MustSeeThis(TimePoint now) const;
-  // The frames to be made for those who can be served: who lack one, or all.
+  // What is to be made for those who can be served: of the present revision, as
+  // far as it is not there, for who lacks a frame; or of the next, for all.
   std::vector<FrameKey> Wanted(bool by_all, TimePoint now) const;
+  bool WantsNormals(bool by_all, TimePoint now) const;
   // When somebody can be served next who lacks a frame, has nothing under way
   // and waits for his interval to be over; none if nobody does.
   std::optional<TimePoint> NextDue() const;
@@ -84,9 +86,11 @@ class Audience {
   // Frames that are published from now on are of the changed rig. Needs
   // HasRoomForRigChange().
   void Announce(const std::shared_ptr<const RigChange>& change);
-  // Frames of the present revision, or of the next, for which there is room.
-  // Who can be served gets his, as far as it is there; others lack one.
-  void Publish(uint64_t revision, Frames frames, TimePoint now);
+  // Frames of the present revision, or of the next, for which there is room,
+  // and its normals if they were wanted. Who can be served gets his, as far as
+  // it is there; others lack one.
+  void Publish(uint64_t revision, Frames frames, TimePoint now,
+               std::shared_ptr<const FrameNormals> normals = nullptr);
   // Who lacks a frame of the present revision and can be served by now gets
   // his, as far as it is there. Tells who.
   Receivers Serve(TimePoint now);
@@ -110,6 +114,7 @@ class Audience {
   struct Seat {
     Outbox outbox;
     FrameFormat format;
+    bool normals = false;
     std::chrono::nanoseconds interval{0};
     std::weak_ptr<Receiver> receiver;
     uint64_t contained = 0;  // Newest pose that the revision contains.
@@ -136,7 +141,8 @@ class Audience {
   std::map<int64_t, Seat> seats_;
   int64_t next_seat_ = 1;
   uint64_t revision_ = 0;
-  Frames frames_;  // Of the revision.
+  Frames frames_;                                // Of the revision.
+  std::shared_ptr<const FrameNormals> normals_;  // Likewise, if wanted.
 };
 
 }  // namespace deform::server

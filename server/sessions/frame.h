@@ -54,6 +54,11 @@ struct FrameKey {
   auto operator<=>(const FrameKey&) const = default;
 };
 
+// Normals of a revision (core/frames/normals.h), in the order of the model: two
+// bytes a vertex, for all who want them, whatever their encoding. Immutable;
+// travels as shared_ptr<const FrameNormals>.
+using FrameNormals = std::vector<uint8_t>;
+
 // Immutable; travels as shared_ptr<const Frame>.
 struct Frame {
   struct Chunk {

@@ -5,9 +5,13 @@
 #include <cstring>
 
 #include "core/base/status_macros.h"
+#include "core/frames/normals.h"
 
 namespace deform::server {
 namespace {
+
+// Points whose places one thread takes in a row.
+constexpr int64_t kCopiedTogether = 8192;
 
 // An encoding may write up to a whole chunk whatever it returns, so it writes
 // here first and the frame keeps what it needs.
@@ -65,10 +69,16 @@ double FrameMaker::ShareOf(double tolerance, double weight_error) {
   return weight_error <= 0.25 * tolerance ? 0.75 * tolerance : 0.5 * tolerance;
 }
 
+void FrameMaker::Begin(const FrameInfo& info) {
+  if (revision_ == info.revision) return;
+  revision_ = info.revision;
+  grids_.clear();
+  normals_.reset();
+}
+
 Frames FrameMaker::Make(const Deformer& deformer, const FrameInfo& info,
                         std::span<const FrameKey> keys, ThreadPool* pool) {
-  if (revision_ != info.revision) grids_.clear();
-  revision_ = info.revision;
+  Begin(info);
   const FrameKey exact{.format = {.encoding = FindEncoding("float32")}};
   Frames frames;
   for (const FrameKey& key : keys) {
@@ -87,11 +97,32 @@ Frames FrameMaker::Make(const Deformer& deformer, const FrameInfo& info,
   return frames;
 }
 
+std::shared_ptr<const FrameNormals> FrameMaker::Normals(
+    const Deformer& deformer, const FrameInfo& info, ThreadPool* pool) {
+  Begin(info);
+  if (normals_ != nullptr) return normals_;
+  if (fans_ == nullptr) fans_ = tables_->FansOf(deformer.binding().model());
+  const int64_t points = deformer.binding().point_count();
+  std::vector<float>& positions = ThreadScratch().positions;
+  positions.resize(3 * points);
+  ParallelFor(pool, (points + kCopiedTogether - 1) / kCopiedTogether, nullptr,
+              [&](int64_t block) {
+                const int64_t first = block * kCopiedTogether;
+                deformer.CopyRelative(
+                    first, std::min(kCopiedTogether, points - first),
+                    info.origin, positions.data() + 3 * first);
+              });
+  FrameNormals normals(kNormalBytes * points);
+  fans_->EncodeNormals(positions, normals, pool);
+  normals_ = std::make_shared<const FrameNormals>(std::move(normals));
+  return normals_;
+}
+
 absl::StatusOr<std::shared_ptr<const RevisionGrid>> FrameMaker::GridOf(
     const Deformer& deformer, const FrameInfo& info, double step) {
   const auto made = grids_.find(step);
   if (made != grids_.end()) return made->second;
-  if (order_ == nullptr) order_ = orders_->Of(deformer.binding().model());
+  if (order_ == nullptr) order_ = tables_->OrderOf(deformer.binding().model());
   const int64_t points = deformer.binding().point_count();
   const int dimension = deformer.binding().dimension();
   std::vector<float>& positions = ThreadScratch().positions;

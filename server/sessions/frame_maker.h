@@ -11,7 +11,7 @@
 #include "core/base/thread_pool.h"
 #include "core/deform/deformer.h"
 #include "server/sessions/frame.h"
-#include "server/sessions/point_orders.h"
+#include "server/sessions/model_tables.h"
 
 namespace deform::server {
 
@@ -21,14 +21,21 @@ using Frames = std::map<FrameKey, std::shared_ptr<const Frame>>;
 // the present revision share.
 class FrameMaker {
  public:
-  explicit FrameMaker(std::shared_ptr<PointOrders> orders)
-      : orders_(std::move(orders)) {}
+  explicit FrameMaker(std::shared_ptr<ModelTables> tables)
+      : tables_(std::move(tables)) {}
 
   // Encodes where `deformer` is, for every key, chunks in parallel on `pool`
   // (may be null). Where an encoding cannot keep its tolerance the frame is
   // float32, and shared with those who want that.
   Frames Make(const Deformer& deformer, const FrameInfo& info,
               std::span<const FrameKey> keys, ThreadPool* pool);
+
+  // Where `deformer` is, whose model has faces in 3D; once for all who want
+  // them of this revision. Blocks of vertices in parallel on `pool` (may be
+  // null).
+  std::shared_ptr<const FrameNormals> Normals(const Deformer& deformer,
+                                              const FrameInfo& info,
+                                              ThreadPool* pool);
 
   // What of `tolerance` is left to an encoding by weights that may have moved a
   // point by `weight_error`. All if that is 0; else 3/4 or 1/2: few values, so
@@ -39,6 +46,8 @@ class FrameMaker {
  private:
   using Grids = std::map<double, std::shared_ptr<const RevisionGrid>>;
 
+  // What is kept is of this revision.
+  void Begin(const FrameInfo& info);
   absl::StatusOr<std::shared_ptr<const RevisionGrid>> GridOf(
       const Deformer& deformer, const FrameInfo& info, double step);
   absl::StatusOr<std::shared_ptr<const Frame>> Encode(const Deformer& deformer,
@@ -46,10 +55,12 @@ class FrameMaker {
                                                       const FrameKey& key,
                                                       ThreadPool* pool);
 
-  const std::shared_ptr<PointOrders> orders_;
+  const std::shared_ptr<ModelTables> tables_;
   std::shared_ptr<const PointOrder> order_;  // Once a grid was wanted.
+  std::shared_ptr<const VertexFans> fans_;   // Once normals were.
   uint64_t revision_ = 0;
-  Grids grids_;  // Of the revision, by step.
+  Grids grids_;                                  // Of the revision, by step.
+  std::shared_ptr<const FrameNormals> normals_;  // Likewise.
 };
 
 }  // namespace deform::server

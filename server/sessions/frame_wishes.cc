@@ -49,6 +49,19 @@ absl::StatusOr<std::chrono::nanoseconds> IntervalOf(Delivery delivery,
   return std::chrono::nanoseconds(std::llround(1e9 / max_fps));
 }
 
+absl::Status CheckHasNormals(const Mesh& model) {
+  if (model.dimension() == 3 && model.faces().rows() > 0) {
+    return absl::OkStatus();
+  }
+  return MakeError(absl::StatusCode::kFailedPrecondition,
+                   model.dimension() == 3
+                       ? "the model has no faces, so its vertices have no "
+                         "normals: join without"
+                       : "a model in two dimensions has no normals: join "
+                         "without",
+                   {.reason = "NO_NORMALS", .field = "normals"});
+}
+
 }  // namespace
 
 absl::StatusOr<FrameFormat> PickFormat(const FrameWishes& wishes,
@@ -94,12 +107,15 @@ absl::StatusOr<FrameFormat> PickFormat(const FrameWishes& wishes,
 
 absl::StatusOr<Subscription> Subscribe(Delivery delivery,
                                        const FrameWishes& wishes,
-                                       const Rig& rig) {
+                                       const Rig& rig, const Mesh& model) {
   DEFORM_ASSIGN_OR_RETURN(const FrameFormat format, PickFormat(wishes, rig));
+  if (wishes.normals) DEFORM_RETURN_IF_ERROR(CheckHasNormals(model));
   DEFORM_ASSIGN_OR_RETURN(const auto interval,
                           IntervalOf(delivery, wishes.max_fps));
-  return Subscription{
-      .delivery = delivery, .format = format, .interval = interval};
+  return Subscription{.delivery = delivery,
+                      .format = format,
+                      .normals = wishes.normals,
+                      .interval = interval};
 }
 
 }  // namespace deform::server

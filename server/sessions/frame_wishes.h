@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/frames/encoding.h"
+#include "core/mesh/mesh.h"
 #include "core/mesh/rig.h"
 #include "server/sessions/frame.h"
 #include "server/sessions/outbox.h"
@@ -24,12 +25,14 @@ struct FrameWishes {
   std::optional<double> tolerance_fraction;
   // Frames a second, at most; 0: as they come.
   double max_fps = 0;
+  bool normals = false;
 };
 
 // What it gets.
 struct Subscription {
   Delivery delivery = Delivery::kLatest;
   FrameFormat format;
+  bool normals = false;
   // Between two frames, at least; only with kLatest.
   std::chrono::nanoseconds interval{0};
 };
@@ -46,8 +49,10 @@ absl::StatusOr<FrameFormat> PickFormat(const FrameWishes& wishes,
 // And InvalidArgument:
 //   MAX_FPS_OUT_OF_RANGE
 //   CONTRADICTION           fewer frames than all, and all of them
+// FailedPrecondition:
+//   NO_NORMALS              of a model without faces, or in 2D
 absl::StatusOr<Subscription> Subscribe(Delivery delivery,
                                        const FrameWishes& wishes,
-                                       const Rig& rig);
+                                       const Rig& rig, const Mesh& model);
 
 }  // namespace deform::server

@@ -5,7 +5,8 @@
 
 namespace deform::server {
 
-void Outbox::Offer(std::shared_ptr<const Frame> frame, uint64_t answers) {
+void Outbox::Offer(std::shared_ptr<const Frame> frame, uint64_t answers,
+                   std::shared_ptr<const FrameNormals> normals) {
   assert(!full());
   RigChanges changes;
   if (delivery_ == Delivery::kLatest && !frames_.empty()) {
@@ -14,7 +15,8 @@ void Outbox::Offer(std::shared_ptr<const Frame> frame, uint64_t answers) {
   }
   changes.insert(changes.end(), announced_.begin(), announced_.end());
   announced_.clear();
-  frames_.push_back({std::move(changes), std::move(frame), answers});
+  frames_.push_back(
+      {std::move(changes), std::move(frame), std::move(normals), answers});
 }
 
 void Outbox::Announce(std::shared_ptr<const RigChange> change) {
@@ -87,7 +89,9 @@ FrameToSend Outbox::TakeFrame() {
   const Waiting waiting = std::move(frames_.front());
   frames_.pop_front();
   const FrameInfo& info = waiting.frame->info;
-  FrameToSend send{.frame = waiting.frame, .answers_sequence = waiting.answers};
+  FrameToSend send{.frame = waiting.frame,
+                   .normals = waiting.normals,
+                   .answers_sequence = waiting.answers};
   // The same revision comes again to who asked for a keyframe.
   if ((sent_any_ || goes_on_) && info.revision > revision_) {
     send.skipped_revisions = info.revision - revision_ - 1;

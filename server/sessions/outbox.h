@@ -27,6 +27,7 @@ enum class Delivery {
 // A frame with what its header says to this receiver.
 struct FrameToSend {
   std::shared_ptr<const Frame> frame;
+  std::shared_ptr<const FrameNormals> normals;  // Null if it wants none.
   uint64_t answers_sequence = 0;
   uint64_t skipped_revisions = 0;
   bool tells_origin = false;
@@ -78,7 +79,8 @@ class Outbox {
 
   // `answers` is the participant's newest pose in this frame; never falls.
   // Needs !full().
-  void Offer(std::shared_ptr<const Frame> frame, uint64_t answers);
+  void Offer(std::shared_ptr<const Frame> frame, uint64_t answers,
+             std::shared_ptr<const FrameNormals> normals = nullptr);
   // The next frame must wait until one is taken. Only with kEvery.
   bool full() const;
   bool has_frames() const { return !frames_.empty(); }
@@ -116,6 +118,7 @@ class Outbox {
   struct Waiting {
     RigChanges changes;  // To be told before.
     std::shared_ptr<const Frame> frame;
+    std::shared_ptr<const FrameNormals> normals;
     uint64_t answers;
   };
 

@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
+#include "core/frames/normals.h"
 #include "server/models/names.h"
 
 namespace deform::server {
@@ -42,7 +43,7 @@ Session::Session(StoredStart start, BindingInUse use,
       dimension_(use.lease.record()->facts.dimension()),
       create_time_(start.create_time),
       environment_(environment),
-      frame_maker_(environment.point_orders),
+      frame_maker_(environment.model_tables),
       memory_(std::move(memory)),
       lease_(std::move(use.lease)),
       binding_id_(lease_.record()->id),
@@ -66,10 +67,11 @@ Session::Session(StoredStart start, BindingInUse use,
 
 int64_t Session::BytesFor(const BindingFacts& binding) {
   const int64_t columns = binding.column_count();
-  // Displacements of double, two frames of float, two grids, columns and a few
-  // poses.
+  // Displacements of double, two frames of float with normals, two grids,
+  // columns and a few poses.
   return binding.point_count() * 3 *
              int64_t{sizeof(double) + 2 * sizeof(float) + 2 * sizeof(int32_t)} +
+         binding.point_count() * 2 * kNormalBytes +
          6 * columns * 3 * int64_t{sizeof(double)};
 }
 
@@ -189,7 +191,9 @@ Session::Step Session::BeginStep() {
       step.pose = queue_.Pop();
     }
   }
-  step.wanted = audience_.Wanted(step.move || step.pose, now);
+  const bool by_all = step.move || step.pose;
+  step.wanted = audience_.Wanted(by_all, now);
+  step.wants_normals = audience_.WantsNormals(by_all, now);
   return step;
 }
 
@@ -198,7 +202,11 @@ void Session::FinishStep(Step step, ThreadPool* pool) {
   if (step.move) moved = ChangeRig(step, pool);
   if (step.refreshed != nullptr) ChangeForm(step, pool);
   if (step.pose) Describe(step.pose->pose, step.report, step.deform_time);
-  Wake(Publish(step, frame_maker_.Make(*deformer_, info_, step.wanted, pool)));
+  std::shared_ptr<const FrameNormals> normals;
+  if (step.wants_normals)
+    normals = frame_maker_.Normals(*deformer_, info_, pool);
+  Wake(Publish(step, frame_maker_.Make(*deformer_, info_, step.wanted, pool),
+               std::move(normals)));
   EndIfLost();
   if (!step.move) return;
   // The binding before is let go before anyone learns of it.
@@ -276,7 +284,8 @@ void Session::ChangeForm(Step& step, ThreadPool* pool) {
   weights_.swap(step.refreshed);
 }
 
-Session::Receivers Session::Publish(Step& step, Frames frames) {
+Session::Receivers Session::Publish(
+    Step& step, Frames frames, std::shared_ptr<const FrameNormals> normals) {
   MutexLock lock(mutex_);
   Pose before;
   if (step.change != nullptr) PublishChange(step);
@@ -291,7 +300,8 @@ Session::Receivers Session::Publish(Step& step, Frames frames) {
   const bool newer = revision_ != info_.revision;
   revision_ = info_.revision;
   if (newer) Journal(step, before);
-  audience_.Publish(revision_, std::move(frames), environment_.clock());
+  audience_.Publish(revision_, std::move(frames), environment_.clock(),
+                    std::move(normals));
   scheduled_ = false;
   Schedule();
   return audience_.receivers();

@@ -25,9 +25,9 @@
 #include "server/sessions/frame.h"
 #include "server/sessions/frame_maker.h"
 #include "server/sessions/frame_wishes.h"
+#include "server/sessions/model_tables.h"
 #include "server/sessions/outbox.h"
 #include "server/sessions/participant.h"
-#include "server/sessions/point_orders.h"
 #include "server/sessions/pose_queue.h"
 #include "server/sessions/rig_change.h"
 #include "server/sessions/rig_history.h"
@@ -56,7 +56,7 @@ struct SessionEnvironment {
   std::function<void(std::chrono::steady_clock::time_point,
                      std::function<void()>)>
       call_at = {};
-  std::shared_ptr<PointOrders> point_orders = std::make_shared<PointOrders>();
+  std::shared_ptr<ModelTables> model_tables = std::make_shared<ModelTables>();
   JournalReport report = {};  // May be empty.
   // What the manager adds. The store of all sessions; null: they are not kept.
   Store* store = nullptr;
@@ -173,6 +173,7 @@ class Session : public std::enable_shared_from_this<Session> {
     std::shared_ptr<const RigChange> change;  // What the move made.
     std::string binding_id;                   // Before it.
     std::vector<FrameKey> wanted;             // Frames to be made.
+    bool wants_normals = false;
     Deformer* deformer = nullptr;
     // Once the deformer has moved to the pose.
     DeformReport report;
@@ -238,7 +239,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void ChangeForm(Step& step, ThreadPool* pool);
   void Describe(const Pose& pose, const DeformReport& report,
                 std::chrono::microseconds time);
-  Receivers Publish(Step& step, Frames frames);
+  Receivers Publish(Step& step, Frames frames,
+                    std::shared_ptr<const FrameNormals> normals);
   void PublishChange(Step& step) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Tells the store of the revision that `before` went to.
   void Journal(const Step& step, const Pose& before)

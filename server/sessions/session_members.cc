@@ -19,8 +19,9 @@ absl::StatusOr<Session::Joined> Session::Join(Delivery delivery,
   const auto join = [&]() -> absl::StatusOr<Joined> {
     MutexLock lock(mutex_);
     if (closed_) return *closed_;
-    DEFORM_ASSIGN_OR_RETURN(const Subscription wanted,
-                            Subscribe(delivery, wishes, facts().rig()));
+    DEFORM_ASSIGN_OR_RETURN(
+        const Subscription wanted,
+        Subscribe(delivery, wishes, facts().rig(), *facts().model()));
     DEFORM_RETURN_IF_ERROR(roster_.CheckAttempt(who, now));
     if (const auto before = roster_.SeatOf(who.token)) {
       to_wake = audience_.receivers({&*before, 1});

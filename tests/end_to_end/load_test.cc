@@ -110,6 +110,12 @@ TEST_F(Load, ViewersMayWantFewFrames) {
   EXPECT_TRUE(ServerIsEmpty());
 }
 
+TEST_F(Load, FramesMayHaveNormals) {
+  const Json report = RunJson({"--normals"});
+  EXPECT_EQ(report["normals"], true);
+  EXPECT_EQ(report["bytes_per_frame"], 162 * (12 + 2));
+}
+
 TEST_F(Load, ChecksFramesOfEverySession) {
   const Json report = RunJson({"--sessions", "3"});
   EXPECT_GE(report["checks"]["frames"], 3);

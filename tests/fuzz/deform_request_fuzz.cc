@@ -67,7 +67,8 @@ void CheckLock(const v1::LockHandles& message) {
 void CheckJoin(const v1::Join& message) {
   const auto join = FromProto(message);
   if (!join.ok()) return CheckRefusal(join.status());
-  const auto wanted = Subscribe(join->delivery, join->frames, CubeRig());
+  static const Mesh model = MeshOf(Icosphere(0.5, 0));
+  const auto wanted = Subscribe(join->delivery, join->frames, CubeRig(), model);
   if (!wanted.ok()) return CheckRefusal(wanted.status());
   const FrameFormat& format = wanted->format;
   FUZZ_EXPECT(format.encoding != nullptr);

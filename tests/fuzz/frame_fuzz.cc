@@ -1,8 +1,9 @@
 // Frames as a client receives them: any chunks give whole frames or BAD_FRAME.
 //
-// Input: dimension and number of points, one byte each; then messages, each
-// after its length in two bytes: chunks of frames, or, if the highest bit of
-// the length is set, of the order of points.
+// Input: dimension (lowest bit) and whether there are normals (the next), and
+// the number of points, one byte each; then messages, each after its length in
+// two bytes: chunks of frames, or, if the highest bit of the length is set, of
+// the order of points.
 #include <algorithm>
 
 #include "client/cpp/frame_assembler.h"
@@ -13,7 +14,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (size < 2) return 0;
   const int dimension = data[0] % 2 == 0 ? 2 : 3;
   const int64_t points = data[1];
-  deform::FrameAssembler assembler(dimension, points);
+  const bool normals = (data[0] & 2) != 0;
+  deform::FrameAssembler assembler(dimension, points, normals);
   deform::Frame frame;
   size_t at = 2;
   while (at + 2 <= size) {
@@ -39,6 +41,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     }
     if (*complete) {
       FUZZ_EXPECT(frame.point_count() == points);
+      FUZZ_EXPECT(frame.normals.size() ==
+                  (normals ? 3u * static_cast<size_t>(points) : 0u));
       FUZZ_EXPECT(frame.DoublePositions().rows() == points);
     }
   }

@@ -37,6 +37,7 @@ struct Options {
   LoadStageOptions stage;
   LoadOptions load;
   FrameOptions frames;
+  bool normals = false;
   std::string delivery = "latest";
   std::string duration = "10s";
   std::string warm_up = "1s";
@@ -75,6 +76,7 @@ absl::Status Complete(Options& options) {
     return UsageError(
         "--viewer-fps leaves frames out: it needs --delivery latest");
   }
+  load.frames.normals = options.normals;
   options.stage.frame_tolerance = options.frames.tolerance;
   options.stage.check = load.check_interval.count() > 0;
   options.stage.editors = load.editors;
@@ -353,6 +355,8 @@ void AddLoadOptions(CLI::App& app, Options& options) {
       ->check(CLI::IsMember({"latest", "every"}))
       ->capture_default_str();
   options.frames.AddTo(app);
+  app.add_flag("--normals", options.normals,
+               "Frames with normals of their vertices: two bytes each");
   app.add_option("--connections", options.connections,
                  "Connections that the participants share; 0: one for 16")
       ->check(CLI::Range(int64_t{0}, kMaxConnections))

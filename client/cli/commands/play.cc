@@ -26,6 +26,7 @@ struct Options {
   int64_t frames = 120;
   std::string delivery = "every";
   double max_fps = 0;
+  bool normals = false;
   int in_flight = 4;
   double rate = 0;
   double blend = 1;
@@ -165,6 +166,7 @@ absl::Status Run(const Options& options, Context& context) {
       DeformOptions frames,
       options.format.For(every ? Delivery::kEvery : Delivery::kLatest));
   frames.max_fps = options.max_fps;
+  frames.normals = options.normals;
   DEFORM_RETURN_IF_ERROR(PrepareDirectory(options.out_dir));
   DEFORM_ASSIGN_OR_RETURN(const std::unique_ptr<Stage> stage,
                           Stage::Open(context, options.stage));
@@ -212,6 +214,8 @@ Action Setup(CLI::App& app) {
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str()
       ->type_name("HZ");
+  app.add_flag("--normals", options->normals,
+               "Frames with normals of their vertices: two bytes each");
   app.add_option("--in-flight", options->in_flight,
                  "Poses sent ahead of the frames that answer them, at most")
       ->check(CLI::Range(1, 1000))

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <optional>
 
+#include "absl/strings/str_cat.h"
 #include "core/base/error.h"
 
 namespace deform {
@@ -147,6 +148,50 @@ TEST(FrameAssembler, AddsWhatAFrameDiffersByFromTheOneThatIsHeld) {
   ASSERT_TRUE(*assembler.Add(Predicted(6, 20, 4, 10), frame));
   EXPECT_FALSE(frame.keyframe);
   EXPECT_EQ(frame.DoublePositions()(2, 2), 100 + 20 * 0.5);
+}
+
+v1::FrameChunk WithNormals(v1::FrameChunk chunk, const std::string& bytes) {
+  chunk.set_normals(bytes);
+  return chunk;
+}
+
+TEST(FrameAssembler, HasNormalsInTheOrderOfTheModel) {
+  FrameAssembler assembler(3, kPoints, true);
+  Frame frame;
+  const std::string up("\0\0", 2), along_x("\x7f\0", 2), along_y("\0\x7f", 2);
+  ASSERT_FALSE(
+      *assembler.Add(WithNormals(Keyframe(0, 2, false), up + along_x), frame));
+  ASSERT_TRUE(*assembler.Add(WithNormals(Chunk(2, 1, true), along_y), frame));
+  EXPECT_EQ(frame.normals, (std::vector<float>{0, 0, 1, 1, 0, 0, 0, 1, 0}));
+  EXPECT_EQ(frame.bytes, kPoints * (12 + 2));
+  // Also where positions come in another.
+  ASSERT_TRUE(assembler.AddOrder(Order(0, {2, 1, 0})).ok());
+  v1::FrameChunk on_grid = OnGrid(8, 10);
+  on_grid.set_epoch(1);
+  ASSERT_TRUE(
+      *assembler.Add(WithNormals(on_grid, along_x + up + along_y), frame));
+  EXPECT_EQ(frame.normals, (std::vector<float>{1, 0, 0, 0, 0, 1, 0, 1, 0}));
+}
+
+TEST(FrameAssembler, WithoutNormalsHasNone) {
+  FrameAssembler assembler = NewAssembler();
+  Frame frame;
+  frame.normals.resize(9);
+  ASSERT_TRUE(*assembler.Add(Keyframe(0, 3, true), frame));
+  EXPECT_TRUE(frame.normals.empty());
+}
+
+TEST(FrameAssembler, RefusesNormalsThatAreNotTwoBytesEach) {
+  for (const std::string& bytes :
+       {std::string(), std::string(5, 'n'), std::string(8, 'n')}) {
+    FrameAssembler assembler(3, kPoints, true);
+    Frame frame;
+    const absl::Status status =
+        assembler.Add(WithNormals(Keyframe(0, 3, true), bytes), frame).status();
+    EXPECT_EQ(DetailOf(status).reason, "BAD_FRAME");
+    EXPECT_EQ(std::string(status.message()),
+              absl::StrCat("there are ", bytes.size(), " bytes for 3 normals"));
+  }
 }
 
 TEST(FrameAssembler, FramesOfFloatsInBetweenChangeNothingThatIsHeld) {
@@ -290,6 +335,9 @@ INSTANTIATE_TEST_SUITE_P(
            return std::vector{chunk};
          },
          "encoding \"lz\" is not known"},
+        {"Normals",
+         [] { return std::vector{WithNormals(Keyframe(0, 3, true), "n")}; },
+         "a chunk has normals, which were not asked for"},
         {"GridWithoutOrder", [] { return std::vector{OnGrid(1, 0)}; },
          "the order of points has not come"},
         {"NothingHeld",

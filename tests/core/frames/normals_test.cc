@@ -93,6 +93,15 @@ TEST(Normals, ThatAreNonePointUp) {
             (std::vector<uint8_t>{0, 0, 0, 0, 0, 0}));
 }
 
+TEST(Normals, OfAnyLengthGiveTheSameBytes) {
+  for (const double length : {1e-323, 1e-300, 1.0, 1e300}) {
+    uint8_t bytes[2] = {1, 1};
+    EncodeNormal({0, -length, 0}, bytes);
+    EXPECT_EQ(bytes[0], 0);
+    EXPECT_EQ(bytes[1], 129);
+  }
+}
+
 TEST(Normals, OfAnyBytesAreUnitVectors) {
   std::vector<uint8_t> bytes;
   for (int i = 0; i < 256; ++i) {

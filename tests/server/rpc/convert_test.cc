@@ -308,6 +308,9 @@ TEST(ConvertJoin, KeepsHowManyFramesAreWanted) {
   EXPECT_EQ(FromProto(join)->frames.max_fps, 0);
   join.set_max_fps(30);
   EXPECT_EQ(FromProto(join)->frames.max_fps, 30);
+  EXPECT_FALSE(FromProto(join)->frames.normals);
+  join.set_normals(true);
+  EXPECT_TRUE(FromProto(join)->frames.normals);
 }
 
 TEST(ConvertJoin, RefusesWhatItDoesNotKnow) {

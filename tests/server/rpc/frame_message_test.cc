@@ -94,6 +94,17 @@ TEST(FrameMessage, TellsWhatAFrameOnAGridRefersTo) {
   EXPECT_EQ(Parsed({.frame = frame}, 0).error_bound(), 0.5);
 }
 
+TEST(FrameMessage, HasTheNormalsOfItsVertices) {
+  const auto normals = std::make_shared<const FrameNormals>(
+      FrameNormals{'a', 'b', 'c', 'd', 'e', 'f'});
+  const FrameToSend send{.frame = TwoChunks(), .normals = normals};
+  EXPECT_EQ(Parsed(send, 0).normals(), "abcd");
+  EXPECT_EQ(Parsed(send, 0).data(), std::string(24, '\2'));
+  EXPECT_EQ(Parsed(send, 1).normals(), "ef");
+  EXPECT_EQ(Parsed(send, 1).data(), std::string(12, '\1'));
+  EXPECT_EQ(Parsed({.frame = TwoChunks()}, 0).normals(), "");
+}
+
 TEST(OrderMessage, TellsTheIndicesInParts) {
   // 1 MiB holds 2^18 of them.
   constexpr int64_t kPoints = (1 << 18) + 3;
@@ -118,6 +129,22 @@ TEST(FrameMessage, DoesNotCopyTheData) {
   std::vector<grpc::Slice> slices;
   ASSERT_TRUE(message.Dump(&slices).ok());
   EXPECT_EQ(slices.back().begin(), frame->chunks[0].bytes.get());
+}
+
+TEST(FrameMessage, DoesNotCopyTheNormals) {
+  auto normals = std::make_shared<const FrameNormals>(FrameNormals(6));
+  const std::weak_ptr<const FrameNormals> alive = normals;
+  {
+    const grpc::ByteBuffer message =
+        FrameMessage({.frame = TwoChunks(), .normals = normals}, 1, 1, 0);
+    std::vector<grpc::Slice> slices;
+    ASSERT_TRUE(message.Dump(&slices).ok());
+    ASSERT_EQ(slices.size(), 4u);
+    EXPECT_EQ(slices[1].begin(), normals->data() + 4);
+    normals.reset();
+    EXPECT_FALSE(alive.expired());
+  }
+  EXPECT_TRUE(alive.expired());
 }
 
 TEST(FrameMessage, KeepsTheFrameUntilItIsSent) {

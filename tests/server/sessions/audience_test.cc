@@ -240,6 +240,43 @@ TEST_F(AudienceTest, AFrameThatRefersToWhatWasLostIsNotSent) {
   EXPECT_EQ(sent.frame->reference_revision, std::nullopt);
 }
 
+TEST_F(AudienceTest, GivesNormalsToWhoWantsThemBesideTheSameFrame) {
+  const int64_t with =
+      audience_.Add({.format = float32_, .normals = true}, {}, now_);
+  const int64_t without = Add();
+  const auto normals = std::make_shared<const FrameNormals>();
+  EXPECT_TRUE(audience_.WantsNormals(true, now_));
+  EXPECT_TRUE(audience_.WantsNormals(false, now_));
+  audience_.Publish(1, Made(1, audience_.Wanted(true, now_)), now_, normals);
+  const FrameToSend sent = TakeFrame(with);
+  const FrameToSend other = TakeFrame(without);
+  EXPECT_EQ(sent.frame, other.frame);
+  EXPECT_EQ(sent.normals, normals);
+  EXPECT_EQ(other.normals, nullptr);
+}
+
+TEST_F(AudienceTest, NormalsMayComeAfterTheFrame) {
+  Add();
+  Publish(1);
+  EXPECT_FALSE(audience_.WantsNormals(true, now_));
+  const int64_t late =
+      audience_.Add({.format = float32_, .normals = true}, {}, now_);
+  TakeNothing(late);
+  EXPECT_TRUE(audience_.NeedsFrame(now_));
+  // The frame is there.
+  EXPECT_THAT(audience_.Wanted(false, now_), IsEmpty());
+  EXPECT_TRUE(audience_.WantsNormals(false, now_));
+  const auto normals = std::make_shared<const FrameNormals>();
+  audience_.Publish(1, {}, now_, normals);
+  EXPECT_EQ(TakeFrame(late).normals, normals);
+  // They are there for the next who comes, and only in this revision.
+  const int64_t next =
+      audience_.Add({.format = float32_, .normals = true}, {}, now_);
+  EXPECT_FALSE(audience_.NeedsFrame(now_));
+  EXPECT_EQ(TakeFrame(next).normals, normals);
+  EXPECT_TRUE(audience_.WantsNormals(true, now_));
+}
+
 TEST_F(AudienceTest, WhoWantsFewFramesGetsTheNewestWhenTheIntervalIsOver) {
   for (const FrameFormat& format : {float32_, predicted_}) {
     const int64_t seat = AddLimited(format);

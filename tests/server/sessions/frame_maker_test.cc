@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+
+#include "core/frames/normals.h"
 #include "tests/server/sessions/support.h"
 
 namespace deform::server {
@@ -41,7 +44,7 @@ class FrameMakerTest : public testing::Test {
     return (decoded - deformer_.positions()).rowwise().norm().maxCoeff();
   }
 
-  FrameMaker maker_{std::make_shared<PointOrders>()};
+  FrameMaker maker_{std::make_shared<ModelTables>()};
   Deformer deformer_{BindBall(1), nullptr};
 };
 
@@ -141,14 +144,45 @@ TEST_F(FrameMakerTest, LeavesTheWeightsTheirPartOfTheTolerance) {
                    1.5 * kTolerance);
 }
 
-TEST(PointOrders, ModelsKeepTheirOrderAsLongAsSomebodyHoldsIt) {
-  PointOrders orders;
+TEST_F(FrameMakerTest, NormalsAreThoseOfTheDeformedFaces) {
+  const auto largest_error = [&](const FrameNormals& normals) {
+    std::vector<float> told(3 * kBallPoints), plain(told.size()),
+        positions(told.size());
+    EXPECT_TRUE(DecodeNormals(normals, told).ok());
+    deformer_.CopyRelative(0, kBallPoints, Vec3::Zero(), positions.data());
+    ComputeNormals(positions, deformer_.binding().model()->faces(), plain);
+    double largest = 0;
+    for (size_t i = 0; i < told.size(); i += 3) {
+      const Vec3 a(told[i], told[i + 1], told[i + 2]);
+      const Vec3 b(plain[i], plain[i + 1], plain[i + 2]);
+      largest = std::max(largest, std::atan2(a.cross(b).norm(), a.dot(b)));
+    }
+    return largest;
+  };
+  const auto rest = maker_.Normals(deformer_, {.revision = 1}, nullptr);
+  EXPECT_LT(largest_error(*rest), 0.017);
+  deformer_.MoveTo(PoseOf(MoveVertex(0, {-3, -1, -1})));
+  // Once a revision, for all.
+  EXPECT_EQ(maker_.Normals(deformer_, {.revision = 1}, nullptr), rest);
+  ThreadPool pool({.threads = 2});
+  const auto next =
+      maker_.Normals(deformer_, {.revision = 2, .origin = {1, 2, 3}}, &pool);
+  EXPECT_LT(largest_error(*next), 0.017);
+  EXPECT_NE(*next, *rest);
+}
+
+TEST(ModelTables, AreKeptAsLongAsSomebodyHoldsThem) {
+  ModelTables tables;
   const auto ball = std::make_shared<const Mesh>(MeshOf(Icosphere(0.5, 1)));
   const auto other = std::make_shared<const Mesh>(MeshOf(Icosphere(0.5, 2)));
-  const auto order = orders.Of(ball);
+  const auto order = tables.OrderOf(ball);
   EXPECT_EQ(order->size(), ball->size());
-  EXPECT_EQ(orders.Of(ball), order);
-  EXPECT_EQ(orders.Of(other)->size(), other->size());
+  EXPECT_EQ(tables.OrderOf(ball), order);
+  EXPECT_EQ(tables.OrderOf(other)->size(), other->size());
+  const auto fans = tables.FansOf(ball);
+  EXPECT_EQ(fans->points(), ball->size());
+  EXPECT_EQ(tables.FansOf(ball), fans);
+  EXPECT_EQ(tables.FansOf(other)->points(), other->size());
 }
 
 }  // namespace

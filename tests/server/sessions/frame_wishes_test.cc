@@ -72,16 +72,47 @@ TEST(PickFormat, ReceiversOfFloatsShareWhateverTheirTolerance) {
             Pick({}).value());
 }
 
+// For the ball in its cage.
+absl::StatusOr<Subscription> SubscribeTo(Delivery delivery,
+                                         const FrameWishes& wishes) {
+  return Subscribe(delivery, wishes, Rig(BallCage()),
+                   MeshOf(Icosphere(0.5, 1)));
+}
+
 TEST(Subscribe, FramesASecondAreAnInterval) {
-  const Rig rig = BallCage();
   const auto interval = [&](double max_fps) {
-    return Subscribe(Delivery::kLatest, {.max_fps = max_fps}, rig)->interval;
+    return SubscribeTo(Delivery::kLatest, {.max_fps = max_fps})->interval;
   };
   EXPECT_EQ(interval(0), std::chrono::nanoseconds(0));
   EXPECT_EQ(interval(30), std::chrono::nanoseconds(33'333'333));
   EXPECT_EQ(interval(1000), std::chrono::milliseconds(1));
   EXPECT_EQ(interval(0.01), std::chrono::seconds(100));
-  EXPECT_EQ(Subscribe(Delivery::kEvery, {}, rig)->delivery, Delivery::kEvery);
+  EXPECT_EQ(SubscribeTo(Delivery::kEvery, {})->delivery, Delivery::kEvery);
+}
+
+TEST(Subscribe, NormalsAreThereIfFacesAre) {
+  EXPECT_FALSE(SubscribeTo(Delivery::kLatest, {})->normals);
+  EXPECT_TRUE(SubscribeTo(Delivery::kEvery, {.normals = true})->normals);
+  const auto refused = [](int dimension, const Shape& shape) {
+    return Subscribe(
+               Delivery::kLatest, {.normals = true}, Rig(BallCage()),
+               Mesh::Create(dimension, shape.positions, shape.faces).value())
+        .status();
+  };
+  const absl::Status points =
+      refused(3, {.positions = Positions::Zero(3, 3), .faces = Faces(0, 3)});
+  EXPECT_EQ(points.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(DetailOf(points).reason, "NO_NORMALS");
+  EXPECT_EQ(points.message(),
+            "the model has no faces, so its vertices have no normals: join "
+            "without");
+  Faces triangle(1, 3);
+  triangle << 0, 1, 2;
+  const absl::Status flat =
+      refused(2, {.positions = Positions::Zero(3, 3), .faces = triangle});
+  EXPECT_EQ(flat.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(flat.message(),
+            "a model in two dimensions has no normals: join without");
 }
 
 struct BadRate {
@@ -95,8 +126,7 @@ class SubscribeRefuses : public testing::TestWithParam<BadRate> {};
 
 TEST_P(SubscribeRefuses, BadRates) {
   const absl::Status status =
-      Subscribe(GetParam().delivery, {.max_fps = GetParam().max_fps},
-                Rig(BallCage()))
+      SubscribeTo(GetParam().delivery, {.max_fps = GetParam().max_fps})
           .status();
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(DetailOf(status).reason, GetParam().reason);

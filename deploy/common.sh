@@ -3,21 +3,30 @@
 
 say() { printf '\n\033[1m%s\033[0m\n' "$*"; }
 
-# Builds release binaries of server and command line.
+# Builds release binaries: of server and command line, or, after --tests, what is
+# named.
 build() {
-  deploy/install build
+  local tests=OFF packages=build targets=(deformd deformctl)
+  if [ "${1:-}" = --tests ]; then
+    tests=ON packages=test targets=("${@:2}")
+  fi
+  deploy/install $packages
   export CCACHE_BASEDIR="$PWD" CCACHE_NOHASHDIR=1
   mkdir -p "$out"
-  cmake --preset release -DDEFORM_TESTS=OFF >"$out/configure.log" ||
+  cmake --preset release -DDEFORM_TESTS=$tests >"$out/configure.log" ||
     { cat "$out/configure.log"; exit 1; }
-  cmake --build --preset release --target deformd deformctl
+  cmake --build --preset release --target "${targets[@]}"
 }
 deformctl() { build/release/bin/deformctl "$@"; }
 
 # Stops the server, and takes away what was half done.
 server_pid=
-clean_up() {
+stop_server() {
   [ -n "$server_pid" ] && kill "$server_pid" 2>/dev/null && wait "$server_pid" 2>/dev/null
+  server_pid=
+}
+clean_up() {
+  stop_server
   [ -n "${address_pipe:-}" ] && rm -f "$address_pipe"
   rm -f "$out"/vessel.stl.part "$out"/gmsh-doc_*.deb
   return 0
@@ -25,13 +34,15 @@ clean_up() {
 trap clean_up EXIT
 trap 'echo; echo "stopped"; exit 130' INT TERM
 
-# On a free port of this machine; deformctl finds it in DEFORM_SERVER.
+# On a free port of this machine; deformctl finds it in DEFORM_SERVER. Keeps
+# nothing, unless arguments say where.
 start_server() {
+  [ $# -gt 0 ] || set -- --in-memory
   # The pipe brings the line that tells the port.
   address_pipe=$(mktemp -u)
   mkfifo "$address_pipe"
   # In a session of its own: Ctrl-C is ours, the server is told to stop above.
-  setsid build/release/bin/deformd --listen 127.0.0.1:0 --in-memory --log-level warn >"$address_pipe" &
+  setsid build/release/bin/deformd --listen 127.0.0.1:0 "$@" --log-level warn >"$address_pipe" &
   server_pid=$!
   local address
   read -r _ _ address <"$address_pipe"

@@ -73,11 +73,37 @@ Image HowOften(const LatencyHistogram& all) {
   return DrawChart(chart);
 }
 
+Image ServerOverTime(const LoadReport& report, const char* title,
+                     int64_t ServerSample::*what, double unit) {
+  Curve curve{.color = CurveColor(0)};
+  double most = 0;
+  for (const ServerSample& sample : report.server_over_time) {
+    curve.x.push_back(sample.seconds);
+    curve.y.push_back(static_cast<double>(sample.*what) / unit);
+    most = std::max(most, curve.y.back());
+  }
+  Chart chart;
+  chart.title = title;
+  chart.x = {
+      .title = "seconds", .low = 0, .high = std::max(report.seconds, 1e-3)};
+  chart.y = {.low = 0, .high = std::max(1.25 * most, 1.0)};
+  chart.curves.push_back(std::move(curve));
+  chart.height = 180;
+  return DrawChart(chart);
+}
+
 }  // namespace
 
 Image DrawLoad(const LoadReport& report) {
   const LatencyHistogram all = report.figures.Latency();
-  return Stacked({OverTime(report, all), HowOften(all)});
+  std::vector<Image> charts = {OverTime(report, all), HowOften(all)};
+  if (!report.server_over_time.empty()) {
+    charts.push_back(ServerOverTime(report, "Memory of the server, MiB",
+                                    &ServerSample::resident_bytes, 1 << 20));
+    charts.push_back(ServerOverTime(report, "Files that it has open",
+                                    &ServerSample::open_files, 1));
+  }
+  return Stacked(charts);
 }
 
 }  // namespace deform::cli

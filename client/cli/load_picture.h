@@ -6,7 +6,8 @@
 
 namespace deform::cli {
 
-// Percentiles of the latency over time, and below how often each latency came.
+// Percentiles of the latency over time, and below how often each latency came;
+// then the server's memory and open files over time, if it told them.
 Image DrawLoad(const LoadReport& report);
 
 }  // namespace deform::cli

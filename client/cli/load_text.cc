@@ -75,6 +75,54 @@ Json ClientJson(const LoadReport& report) {
           {"processors_used", report.client_cpus}};
 }
 
+Json SamplesJson(const LoadReport& report) {
+  Json samples = Json::array();
+  for (const ServerSample& sample : report.server_over_time) {
+    samples.push_back({{"begin", sample.seconds},
+                       {"resident_bytes", sample.resident_bytes},
+                       {"open_files", sample.open_files}});
+  }
+  return samples;
+}
+
+// Of one thing that the server told over time.
+struct Course {
+  int64_t begin = 0, most = 0, end = 0;
+};
+Course CourseOf(const LoadReport& report, int64_t ServerSample::*what) {
+  const auto& samples = report.server_over_time;
+  if (samples.empty()) return {};
+  Course course{.begin = samples.front().*what, .end = samples.back().*what};
+  for (const ServerSample& sample : samples) {
+    course.most = std::max(course.most, sample.*what);
+  }
+  return course;
+}
+
+Json CourseJson(const LoadReport& report, int64_t ServerSample::*what) {
+  const Course course = CourseOf(report, what);
+  return {{"begin", course.begin}, {"most", course.most}, {"end", course.end}};
+}
+
+Json ServerJson(const LoadReport& report) {
+  return {{"processors_used", report.server_cpus},
+          {"processors", report.server_processors},
+          {"resident_bytes", CourseJson(report, &ServerSample::resident_bytes)},
+          {"open_files", CourseJson(report, &ServerSample::open_files)},
+          {"over_time", SamplesJson(report)}};
+}
+
+std::string ServerText(const LoadReport& report) {
+  const Course memory = CourseOf(report, &ServerSample::resident_bytes);
+  const Course files = CourseOf(report, &ServerSample::open_files);
+  return absl::StrFormat(
+      "%.2f of %d processors; %s resident, at most %s, in the end %s; %d files "
+      "open, at most %d, in the end %d",
+      report.server_cpus, report.server_processors, Bytes(memory.begin),
+      Bytes(memory.most), Bytes(memory.end), files.begin, files.most,
+      files.end);
+}
+
 double BytesPerFrame(const LoadFigures& figures) {
   return static_cast<double>(figures.bytes) /
          static_cast<double>(std::max<int64_t>(1, figures.frames));
@@ -156,11 +204,7 @@ Json ToJson(const LoadSubject& subject, const LoadReport& report) {
           {"deform_us_mean",
            static_cast<double>(figures.deform_us) /
                static_cast<double>(std::max<int64_t>(1, figures.answering))},
-          {"server",
-           {{"processors_used", report.server_cpus},
-            {"processors", report.server_processors},
-            {"resident_bytes_begin", report.server_resident_begin},
-            {"resident_bytes_peak", report.server_resident_peak}}},
+          {"server", ServerJson(report)},
           {"client", ClientJson(report)},
           {"checks", ChecksJson(subject, report)}};
 }
@@ -198,13 +242,7 @@ void Describe(const LoadSubject& subject, const LoadReport& report,
   line("poses", absl::StrCat(Thousands(report.poses_due), " due, ",
                              Thousands(report.poses_sent), " sent, ",
                              Thousands(report.poses_answered), " answered"));
-  if (report.server_processors > 0) {
-    line("server",
-         absl::StrFormat("%.2f of %d processors, %s resident, %s at most",
-                         report.server_cpus, report.server_processors,
-                         Bytes(report.server_resident_begin),
-                         Bytes(report.server_resident_peak)));
-  }
+  if (!report.server_over_time.empty()) line("server", ServerText(report));
   line("client",
        absl::StrFormat("%.2f processors, %.2f %% of the poses sent late, %s "
                        "held back by the connection",

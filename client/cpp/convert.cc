@@ -306,6 +306,7 @@ ServerStatus FromProto(const v1::ServerStatus& status) {
           .uptime_seconds = status.uptime_seconds(),
           .cpu_seconds = status.cpu_seconds(),
           .resident_bytes = static_cast<int64_t>(status.resident_bytes()),
+          .open_files = static_cast<int>(status.open_files()),
           .processors = static_cast<int>(status.processors()),
           .models = static_cast<int64_t>(status.models()),
           .bindings = static_cast<int64_t>(status.bindings()),

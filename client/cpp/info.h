@@ -134,6 +134,7 @@ struct ServerStatus {
   double uptime_seconds = 0;
   double cpu_seconds = 0;
   int64_t resident_bytes = 0;
+  int open_files = 0;
   int processors = 0;
   int64_t models = 0;
   int64_t bindings = 0;

@@ -249,7 +249,9 @@ class Run {
     last_look_ = now;
     last_client_cpu_ = CpuSeconds();
     server_ = *status;
-    resident_peak_ = std::max(resident_peak_, status->resident_bytes);
+    samples_.push_back({.seconds = InSeconds(now - begin_),
+                        .resident_bytes = status->resident_bytes,
+                        .open_files = status->open_files});
   }
 
   // Editors end when their poses are answered, then viewers.
@@ -300,8 +302,7 @@ class Run {
       report.server_cpus =
           (server_->cpu_seconds - first_server_.cpu_seconds) / seconds;
       report.client_cpus = (last_client_cpu_ - client_cpu_) / seconds;
-      report.server_resident_begin = first_server_.resident_bytes;
-      report.server_resident_peak = resident_peak_;
+      report.server_over_time = samples_;
       report.server_processors = server_->processors;
     }
     return report;
@@ -335,7 +336,7 @@ class Run {
   ServerStatus first_server_;
   Clock::time_point first_look_, last_look_;
   double client_cpu_ = 0, last_client_cpu_ = 0;
-  int64_t resident_peak_ = 0;
+  std::vector<ServerSample> samples_;
 
   // What the participants use outlives them.
   LoadRoom room_;

@@ -63,6 +63,13 @@ struct LoadControl {
   std::function<void(const LoadProgress&)> progress;
 };
 
+// What the server told of itself, once a second.
+struct ServerSample {
+  double seconds = 0;  // Since the measured window began.
+  int64_t resident_bytes = 0;
+  int64_t open_files = 0;
+};
+
 struct LoadReport {
   LoadFigures figures;
   double seconds = 0;  // Of the measured window.
@@ -76,8 +83,7 @@ struct LoadReport {
   std::string wrong_session;       // The id of checks.wrong.
   // Of the window; 0 if the server does not tell.
   double server_cpus = 0;  // CPU seconds a second.
-  int64_t server_resident_begin = 0;
-  int64_t server_resident_peak = 0;
+  std::vector<ServerSample> server_over_time;
   int server_processors = 0;
   double client_cpus = 0;
 

@@ -1,11 +1,27 @@
 #include "server/rpc/process_usage.h"
 
+#include <dirent.h>
 #include <time.h>
 #include <unistd.h>
 
 #include <cstdio>
 
 namespace deform::server {
+
+namespace {
+
+int CountOpenFiles() {
+  DIR* const files = opendir("/proc/self/fd");
+  if (files == nullptr) return 0;
+  int count = 0;
+  while (const dirent* const file = readdir(files)) {
+    if (file->d_name[0] != '.') ++count;
+  }
+  closedir(files);
+  return count - 1;  // Without the one that lists them.
+}
+
+}  // namespace
 
 ProcessUsage ReadProcessUsage() {
   ProcessUsage usage;
@@ -22,6 +38,7 @@ ProcessUsage ReadProcessUsage() {
     }
     std::fclose(file);
   }
+  usage.open_files = CountOpenFiles();
   return usage;
 }
 

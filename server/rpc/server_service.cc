@@ -21,6 +21,7 @@ grpc::Status ServerService::GetServerStatus(
     const ProcessUsage usage = ReadProcessUsage();
     status.set_cpu_seconds(usage.cpu_seconds);
     status.set_resident_bytes(usage.resident_bytes);
+    status.set_open_files(usage.open_files);
     status.set_processors(std::thread::hardware_concurrency());
     status.set_models(rooms_.models.catalogue().size());
     status.set_bindings(rooms_.bindings.catalogue().size());

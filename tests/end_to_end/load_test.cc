@@ -190,8 +190,10 @@ TEST_F(Load, TellsPeopleWhatItMeasured) {
 TEST_F(Load, MeasuresTheServer) {
   const Json server = RunJson({})["server"];
   EXPECT_GT(server["processors_used"], 0);
-  EXPECT_GT(server["resident_bytes_begin"].get<int64_t>(), 1 << 20);
-  EXPECT_GE(server["resident_bytes_peak"], server["resident_bytes_begin"]);
+  EXPECT_GT(server["resident_bytes"]["begin"].get<int64_t>(), 1 << 20);
+  EXPECT_GE(server["resident_bytes"]["most"], server["resident_bytes"]["end"]);
+  EXPECT_GT(server["open_files"]["end"].get<int64_t>(), 3);
+  EXPECT_GE(server["over_time"].size(), 2u);
 }
 
 TEST_F(Load, DrawsAPicture) {

@@ -69,6 +69,9 @@ TEST(Status, MeasuresTheProcess) {
   EXPECT_GE(after.uptime_seconds, before.uptime_seconds);
   // More than a megabyte: a count of pages or kilobytes would be less.
   EXPECT_GT(after.resident_bytes, 1 << 20);
+  // Output and error output, at least, and a socket.
+  EXPECT_GE(after.open_files, 3);
+  EXPECT_LT(after.open_files, 1000);
   EXPECT_GT(after.processors, 0);
   EXPECT_NE(after.version, "");
 }

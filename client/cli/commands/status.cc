@@ -14,6 +14,7 @@ Json ToJson(const ServerStatus& status) {
           {"uptime_seconds", status.uptime_seconds},
           {"cpu_seconds", status.cpu_seconds},
           {"resident_bytes", status.resident_bytes},
+          {"open_files", status.open_files},
           {"processors", status.processors},
           {"models", status.models},
           {"bindings", status.bindings},
@@ -37,6 +38,7 @@ void Print(const ServerStatus& status, std::ostream& out) {
            status.cpu_seconds / std::max(status.uptime_seconds, 1e-9),
            status.processors));
   line("memory", absl::StrCat(Bytes(status.resident_bytes), " resident"));
+  line("open files", Thousands(status.open_files));
   line("holds", absl::StrCat(Thousands(status.models), " models, ",
                              Thousands(status.bindings), " bindings, ",
                              Thousands(status.sessions), " sessions with ",

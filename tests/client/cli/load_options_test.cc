@@ -158,9 +158,29 @@ TEST(LoadText, FailsForWrongFramesThenMissingOnesThenSlowOnes) {
             "1e-06 D");
 }
 
+TEST(LoadText, TellsWhatTheServerTookOverTime) {
+  LoadReport report = Report();
+  report.server_cpus = 0.5;
+  report.server_processors = 2;
+  report.server_over_time = {
+      {0, 20 << 20, 9}, {1, 24 << 20, 12}, {2, 21 << 20, 10}};
+  const Json server = ToJson(LoadSubject{}, report)["server"];
+  EXPECT_EQ(server["resident_bytes"]["most"], 24 << 20);
+  EXPECT_EQ(server["open_files"],
+            Json({{"begin", 9}, {"most", 12}, {"end", 10}}));
+  EXPECT_EQ(server["over_time"][1]["open_files"], 12);
+  std::ostringstream text;
+  Describe(LoadSubject{}, report, text);
+  EXPECT_THAT(text.str(), HasSubstr("9 files open, at most 12, in the end 10"));
+}
+
 TEST(LoadText, DrawsEvenARunWithoutAnswers) {
-  EXPECT_GT(DrawLoad(Report()).height, 0);
-  EXPECT_GT(DrawLoad(LoadReport()).height, 0);
+  const int answers = DrawLoad(Report()).height;
+  EXPECT_GT(answers, 0);
+  EXPECT_EQ(DrawLoad(LoadReport()).height, answers);
+  LoadReport told = Report();
+  told.server_over_time = {{0, 20 << 20, 9}};
+  EXPECT_GT(DrawLoad(told).height, answers);
 }
 
 }  // namespace

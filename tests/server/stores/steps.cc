@@ -130,7 +130,11 @@ bool Reference::Apply(const Step& step) {
     state.rows[static_cast<size_t>(step.value % kRows)] = step.value;
   } else {
     if (step.kind == Kind::kMoveRig) {
-      if (!bindings_.contains(step.value)) return false;
+      if (!bindings_.contains(step.value)) {
+        // Found out when it was accepted already.
+        state.needs_whole = true;
+        return false;
+      }
       state.binding = step.value;
     }
     state.rows.assign(kRows, step.value);

@@ -42,7 +42,8 @@ class Reference {
  public:
   // The append that the step makes now.
   PoseAppend Appended(const Step& step) const;
-  // Whether the step succeeds where nothing fails; then it has happened.
+  // Whether the step succeeds where nothing fails; then it has happened. If
+  // not, nothing has, but that a session may take a whole pose next.
   bool Apply(const Step& step);
   // The step was refused by a disk: a session takes a whole pose next.
   void Fail(const Step& step);

@@ -24,14 +24,19 @@ Scratch& ThreadScratch() {
   return scratch;
 }
 
-// `source` but for the positions, which encodings without a grid want.
+// `source` but for the positions, which encodings without a grid want: of those
+// of all points, unless these are empty.
 absl::StatusOr<Frame::Chunk> EncodeChunk(const Deformer& deformer,
                                          const FrameEncoding& encoding,
                                          const Vec3& origin,
+                                         std::span<const float> positions,
                                          ChunkSource source) {
   Scratch& scratch = ThreadScratch();
   scratch.bytes.resize(kMaxChunkBytes);
-  if (source.grid == nullptr) {
+  if (source.grid == nullptr && !positions.empty()) {
+    source.positions = positions.subspan(source.first * source.dimension,
+                                         source.count * source.dimension);
+  } else if (source.grid == nullptr) {
     scratch.positions.resize(source.count * source.dimension);
     deformer.CopyRelative(source.first, source.count, origin,
                           scratch.positions.data());
@@ -72,6 +77,7 @@ double FrameMaker::ShareOf(double tolerance, double weight_error) {
 void FrameMaker::Begin(const FrameInfo& info) {
   if (revision_ == info.revision) return;
   revision_ = info.revision;
+  positions_.clear();
   grids_.clear();
   normals_.reset();
 }
@@ -103,17 +109,16 @@ std::shared_ptr<const FrameNormals> FrameMaker::Normals(
   if (normals_ != nullptr) return normals_;
   if (fans_ == nullptr) fans_ = tables_->FansOf(deformer.binding().model());
   const int64_t points = deformer.binding().point_count();
-  std::vector<float>& positions = ThreadScratch().positions;
-  positions.resize(3 * points);
+  positions_.resize(3 * points);
   ParallelFor(pool, (points + kCopiedTogether - 1) / kCopiedTogether, nullptr,
               [&](int64_t block) {
                 const int64_t first = block * kCopiedTogether;
                 deformer.CopyRelative(
                     first, std::min(kCopiedTogether, points - first),
-                    info.origin, positions.data() + 3 * first);
+                    info.origin, positions_.data() + 3 * first);
               });
   FrameNormals normals(kNormalBytes * points);
-  fans_->EncodeNormals(positions, normals, pool);
+  fans_->EncodeNormals(positions_, normals, pool);
   normals_ = std::make_shared<const FrameNormals>(std::move(normals));
   return normals_;
 }
@@ -125,9 +130,13 @@ absl::StatusOr<std::shared_ptr<const RevisionGrid>> FrameMaker::GridOf(
   if (order_ == nullptr) order_ = tables_->OrderOf(deformer.binding().model());
   const int64_t points = deformer.binding().point_count();
   const int dimension = deformer.binding().dimension();
-  std::vector<float>& positions = ThreadScratch().positions;
-  positions.resize(points * dimension);
-  deformer.CopyRelative(0, points, info.origin, positions.data());
+  std::span<const float> positions = positions_;
+  if (positions.empty()) {
+    std::vector<float>& scratch = ThreadScratch().positions;
+    scratch.resize(points * dimension);
+    deformer.CopyRelative(0, points, info.origin, scratch.data());
+    positions = scratch;
+  }
   DEFORM_ASSIGN_OR_RETURN(Grid grid,
                           PutOnGrid(positions, dimension, step, *order_));
   auto held = std::make_shared<const RevisionGrid>(RevisionGrid{
@@ -161,7 +170,7 @@ absl::StatusOr<std::shared_ptr<const Frame>> FrameMaker::Encode(
         DEFORM_ASSIGN_OR_RETURN(
             frame->chunks[i],
             EncodeChunk(
-                deformer, encoding, info.origin,
+                deformer, encoding, info.origin, positions_,
                 {.dimension = frame->dimension,
                  .first = first,
                  .count = std::min(per_chunk, points - first),

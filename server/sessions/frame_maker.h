@@ -59,8 +59,11 @@ class FrameMaker {
   std::shared_ptr<const PointOrder> order_;  // Once a grid was wanted.
   std::shared_ptr<const VertexFans> fans_;   // Once normals were.
   uint64_t revision_ = 0;
-  Grids grids_;                                  // Of the revision, by step.
-  std::shared_ptr<const FrameNormals> normals_;  // Likewise.
+  // Of the revision: all points relative to the origin, once normals were
+  // wanted (encodings then take them from here, too), and what was made.
+  std::vector<float> positions_;
+  Grids grids_;  // By step.
+  std::shared_ptr<const FrameNormals> normals_;
 };
 
 }  // namespace deform::server

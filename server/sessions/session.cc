@@ -67,10 +67,10 @@ Session::Session(StoredStart start, BindingInUse use,
 
 int64_t Session::BytesFor(const BindingFacts& binding) {
   const int64_t columns = binding.column_count();
-  // Displacements of double, two frames of float with normals, two grids,
-  // columns and a few poses.
+  // Displacements of double, places of float, two frames of these with normals,
+  // two grids, columns and a few poses.
   return binding.point_count() * 3 *
-             int64_t{sizeof(double) + 2 * sizeof(float) + 2 * sizeof(int32_t)} +
+             int64_t{sizeof(double) + 3 * sizeof(float) + 2 * sizeof(int32_t)} +
          binding.point_count() * 2 * kNormalBytes +
          6 * columns * 3 * int64_t{sizeof(double)};
 }

@@ -171,6 +171,25 @@ TEST_F(FrameMakerTest, NormalsAreThoseOfTheDeformedFaces) {
   EXPECT_NE(*next, *rest);
 }
 
+TEST_F(FrameMakerTest, FramesAreTheSameWithAndWithoutNormals) {
+  const FrameInfo info{.origin = {0.1, 0.2, 0.3}};
+  for (const FrameEncoding* encoding : AllEncodings()) {
+    const FrameKey key = {
+        .format = {.encoding = encoding, .tolerance = kTolerance}};
+    const auto chunk_of = [&](FrameMaker& maker) {
+      const auto frame =
+          maker.Make(deformer_, info, {&key, 1}, nullptr).at(key);
+      const Frame::Chunk& chunk = frame->chunks.at(0);
+      return std::vector<uint8_t>(chunk.bytes.get(),
+                                  chunk.bytes.get() + chunk.size);
+    };
+    FrameMaker with(std::make_shared<ModelTables>());
+    with.Normals(deformer_, info, nullptr);
+    FrameMaker without(std::make_shared<ModelTables>());
+    EXPECT_EQ(chunk_of(with), chunk_of(without)) << encoding->id();
+  }
+}
+
 TEST(ModelTables, AreKeptAsLongAsSomebodyHoldsThem) {
   ModelTables tables;
   const auto ball = std::make_shared<const Mesh>(MeshOf(Icosphere(0.5, 1)));

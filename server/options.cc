@@ -71,7 +71,7 @@ void VisitOptions(SomeOptions& o, Visitor&& visit) {
         "1e-2, or 0: weights stay dense. They are compressed in the background "
         "and take about a tenth of the memory and of the time of a pose.");
   visit("max-sessions-memory", o.max_sessions_memory, 1, kMax,
-        "Memory of all sessions: about 36 bytes per point.");
+        "Memory of all sessions: about 90 bytes per point.");
   visit(
       "max-drags-memory", o.max_drags_memory, 0, kMax,
       "Memory in which sessions keep copies of the weights that a drag moves, "

@@ -81,6 +81,12 @@ class StoreDatabase {
   absl::Status CopyTo(const std::string& path, const char* vfs) {
     return database_->CopyTo(path, vfs);
   }
+  // Folds the log into the file, so that its room is free again. Else a disk
+  // that the log has filled would take no commit for ever, not even one that
+  // removes something.
+  absl::Status FoldLog() {
+    return database_->Execute("PRAGMA wal_checkpoint(TRUNCATE)");
+  }
 
  private:
   struct SessionRow {

@@ -13,6 +13,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "core/base/error.h"
 #include "core/base/mutex.h"
 #include "core/base/status_macros.h"
 #include "server/stores/array_shelf.h"
@@ -40,6 +41,8 @@ class SqliteStore : public Store {
 
   absl::Status Start() {
     DEFORM_RETURN_IF_ERROR(shelf_.Prepare());
+    // Of a server that a full disk has stopped.
+    Locked([](StoreDatabase& rows) { return rows.FoldLog(); }).IgnoreError();
     DEFORM_ASSIGN_OR_RETURN(const auto heads, Locked([](StoreDatabase& rows) {
                               return rows.LoadHeads();
                             }));
@@ -193,7 +196,18 @@ class SqliteStore : public Store {
   template <typename Body>
   std::invoke_result_t<Body, StoreDatabase&> Locked(Body body) {
     MutexLock lock(mutex_);
-    return body(*database_);
+    auto result = body(*database_);
+    if (DetailOf(StatusOf(result)).reason == "DISK_FULL") {
+      database_->FoldLog().IgnoreError();
+    }
+    return result;
+  }
+  static const absl::Status& StatusOf(const absl::Status& status) {
+    return status;
+  }
+  template <typename Value>
+  static const absl::Status& StatusOf(const absl::StatusOr<Value>& value) {
+    return value.status();
   }
 
   // The file, then the row that refers to it.

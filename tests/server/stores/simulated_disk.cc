@@ -74,6 +74,27 @@ int SimulatedDisk::Enter() {
   return 0;
 }
 
+void SimulatedDisk::SetSize(int64_t bytes) {
+  MutexLock lock(mutex_);
+  size_ = bytes;
+}
+
+int64_t SimulatedDisk::Used() const {
+  MutexLock lock(mutex_);
+  return UsedBytes();
+}
+
+int64_t SimulatedDisk::UsedBytes() const {
+  std::set<const Node*> seen;
+  int64_t bytes = 0;
+  for (const auto& [name, node] : names_) {
+    if (seen.insert(node.get()).second) {
+      bytes += static_cast<int64_t>(node->now.size());
+    }
+  }
+  return bytes;
+}
+
 void SimulatedDisk::CloseAll() {
   open_.clear();
   for (auto& [name, node] : names_) node->locked_by = 0;
@@ -191,6 +212,9 @@ int64_t SimulatedDisk::WriteAt(int file, const void* data, size_t size,
   if (const int error = Enter()) return error;
   const auto node = Find(file);
   if (node == nullptr) return -EBADF;
+  const int64_t more = offset + static_cast<int64_t>(size) -
+                       static_cast<int64_t>(node->now.size());
+  if (more > 0 && UsedBytes() > size_ - more) return -ENOSPC;
   if (striking_) size = (size + 1) / 2;
   const char* bytes = static_cast<const char*>(data);
   for (size_t done = 0; done < size;) {

@@ -49,6 +49,12 @@ class SimulatedDisk : public FileSystem {
   // Power comes back after a loss; what is left depends on `seed`.
   void Restart(uint64_t seed);
 
+  // Files together may have so many bytes from now on; writes beyond fail with
+  // ENOSPC.
+  void SetSize(int64_t bytes);
+  // That they have.
+  int64_t Used() const;
+
   // From now on it says that it synced these, and does not.
   enum class Lie { kNone, kFiles, kNames };
   void LieAboutSyncsOf(Lie lie);
@@ -102,6 +108,7 @@ class SimulatedDisk : public FileSystem {
 
   // 0, or the error that the call returns; counts it.
   int Enter() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  int64_t UsedBytes() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   std::shared_ptr<Node> Find(int file) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void Change(NameChange change) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   static void Apply(const NameChange& change, Names& names);
@@ -121,6 +128,7 @@ class SimulatedDisk : public FileSystem {
   // Set for the one call that a short or torn fault strikes.
   std::optional<Fault> striking_ ABSL_GUARDED_BY(mutex_);
   bool powered_ ABSL_GUARDED_BY(mutex_) = true;
+  int64_t size_ ABSL_GUARDED_BY(mutex_) = INT64_MAX;
   Lie lie_ ABSL_GUARDED_BY(mutex_) = Lie::kNone;
 };
 

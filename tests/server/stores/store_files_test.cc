@@ -224,6 +224,47 @@ TEST_F(SqliteStoreTest, GoesOnOnceAFullDiskHasRoom) {
   EXPECT_EQ(store_->DurableRevision(live), 3u);
 }
 
+// The log grows until it is folded into the file, which a commit does that went
+// well.
+TEST_F(SqliteStoreTest, FoldsTheLogThatHasFilledTheDisk) {
+  disk_.SetSize(disk_.Used() + 100'000);
+  const StoreKey live = Key("live");
+  uint64_t revision = 0;
+  absl::Status status;
+  while (status.ok()) {
+    ASSERT_LT(revision, 10'000u);
+    ++revision;
+    ASSERT_TRUE(store_->Append(Whole(live, revision, 1, 100), nullptr).ok());
+    status = store_->Sync();
+  }
+  EXPECT_EQ(ReasonOf(status), "DISK_FULL");
+  // So there is room for the next, and to remove something.
+  ++revision;
+  ASSERT_TRUE(store_->Append(Whole(live, revision, 2, 100), nullptr).ok());
+  EXPECT_TRUE(store_->Sync().ok());
+  EXPECT_EQ(store_->DurableRevision(live), revision);
+  EXPECT_TRUE(store_->DeleteSession(live).ok());
+}
+
+TEST_F(SqliteStoreTest, StartsOnADiskThatTheLogHasFilled) {
+  const StoreKey live = Key("live");
+  for (uint64_t revision = 1; revision <= 20; ++revision) {
+    ASSERT_TRUE(store_->Append(Whole(live, revision, 1, 100), nullptr).ok());
+    ASSERT_TRUE(store_->Sync().ok());
+    // From then on all is in the log, and nothing new for the file.
+    if (revision == 3) {
+      store_.reset();
+      store_ = MustOpen(On(disk_));
+    }
+  }
+  disk_.EndProcess();
+  store_.reset();
+  disk_.SetSize(disk_.Used());
+  store_ = MustOpen(On(disk_));
+  const std::vector<StoreKey> taken = {live};
+  EXPECT_TRUE(store_->TakeOver(taken).ok());
+}
+
 TEST_F(SqliteStoreTest, TakesNoMorePosesThanMayWait) {
   store_.reset();
   StoreOptions options = On(disk_);

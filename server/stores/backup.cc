@@ -19,6 +19,20 @@ absl::Status CheckNew(FileSystem& files, const std::string& directory) {
   return FileError(found < 0 ? -found : EEXIST, "make", directory);
 }
 
+// For a copy that is not complete yet.
+absl::Status MakePartial(FileSystem& files, const std::string& partial) {
+  std::vector<std::string> ignored;
+  if (files.List(partial, ignored) >= 0) {
+    return MakeError(
+        absl::StatusCode::kFailedPrecondition,
+        absl::StrCat(partial,
+                     " is there, left of a copy that failed or runs "
+                     "elsewhere: remove it if none does"),
+        {.reason = "DIRECTORY_EXISTS"});
+  }
+  return MakeNewDirectory(files, partial);
+}
+
 // The folders of `name` below `directory`.
 absl::Status MakeFoldersOf(FileSystem& files, const std::string& directory,
                            const std::string& name) {
@@ -39,7 +53,7 @@ std::string CatalogueFile(const std::string& directory) {
 absl::Status BackupWriter::Begin() {
   DEFORM_RETURN_IF_ERROR(CheckNew(files_, target_));
   DEFORM_RETURN_IF_ERROR(MakeDirectory(files_, FolderOf(target_)));
-  return MakeNewDirectory(files_, partial());
+  return MakePartial(files_, partial());
 }
 
 absl::Status BackupWriter::Finish(const std::vector<std::string>& arrays) {
@@ -66,7 +80,7 @@ absl::Status RestoreBackup(FileSystem& files, const char* vfs,
                            const std::string& directory) {
   DEFORM_RETURN_IF_ERROR(CheckNew(files, directory));
   const std::string partial = absl::StrCat(directory, ".partial");
-  DEFORM_RETURN_IF_ERROR(MakeNewDirectory(files, partial));
+  DEFORM_RETURN_IF_ERROR(MakePartial(files, partial));
   DEFORM_RETURN_IF_ERROR(
       CopyFile(files, CatalogueFile(backup), CatalogueFile(partial)));
   {

@@ -202,24 +202,6 @@ TEST(Deform, ALimitedStreamIsClosedWithoutWaiting) {
   EXPECT_EQ(stream.NextFrame(frame).code(), absl::StatusCode::kOutOfRange);
 }
 
-TEST(Deform, SaysWhichFrameRatesThereAre) {
-  RunningServer server;
-  const std::string session = server.BallSession();
-  const auto refused = [&](const DeformOptions& options) {
-    return server.client().Deform(session, options).status();
-  };
-  const absl::Status range = refused({.max_fps = -1});
-  EXPECT_EQ(DetailOf(range).reason, "MAX_FPS_OUT_OF_RANGE");
-  EXPECT_THAT(std::string(range.message()),
-              HasSubstr("max_fps is -1, neither 0 nor within 0.01 and 1000"));
-  const absl::Status all =
-      refused({.delivery = Delivery::kEvery, .max_fps = 30});
-  EXPECT_EQ(DetailOf(all).reason, "CONTRADICTION");
-  EXPECT_THAT(std::string(all.message()),
-              HasSubstr("max_fps leaves revisions out, but delivery EVERY "
-                        "sends all: set one of them"));
-}
-
 TEST(Deform, ParticipantsShareTheSession) {
   RunningServer server;
   const std::string session = server.BallSession();

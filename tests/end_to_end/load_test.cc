@@ -357,7 +357,8 @@ TEST(DeformCall, SendsPosesAndTellsFramesWithoutAThreadThatWaits) {
   const auto call = server.client().StartDeform(
       server.BallSession(), {.delivery = Delivery::kEvery}, events);
   events.Await([&] { return events.points == 162; });
-  const PoseUpdate right = {.vertices = {0}, .positions = Positions::Zero(1, 3)};
+  const PoseUpdate right = {.vertices = {0},
+                            .positions = Positions::Zero(1, 3)};
   // The frame may be here before it is told that the join was sent.
   events.Await([&] { return call->Send(right); });
   events.Await([&] { return events.answered == 1; });

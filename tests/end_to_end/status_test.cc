@@ -42,7 +42,8 @@ TEST(Status, CountsPosesAndFramesExactly) {
   RunningServer server;
   DeformStream stream =
       server.client().Deform(server.BallSession(), Delivery::kEvery).value();
-  const PoseUpdate right = {.vertices = {0}, .positions = Positions::Zero(1, 3)};
+  const PoseUpdate right = {.vertices = {0},
+                            .positions = Positions::Zero(1, 3)};
   PoseUpdate wrong = right;
   wrong.vertices = {8};
   for (int i = 0; i < 3; ++i) stream.Send(right).value();

@@ -389,6 +389,12 @@ TEST_F(SqliteStoreTest, RestoresNothingThatIsDamaged) {
   for (const std::string& file : disk_.Files()) {
     EXPECT_FALSE(absl::StartsWith(file, "/again/")) << file;
   }
+  // What is left of it is named to who tries again.
+  const absl::Status again =
+      RestoreBackup(disk_, disk_.vfs(), "/backup", "/again");
+  EXPECT_EQ(ReasonOf(again), "DIRECTORY_EXISTS");
+  EXPECT_THAT(again.message(), HasSubstr("/again.partial is there, left of a"));
+  EXPECT_THAT(again.message(), HasSubstr("remove it"));
 }
 
 TEST_F(SqliteStoreTest, ABackupThatFailedIsNotTakenForOne) {

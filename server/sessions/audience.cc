@@ -164,7 +164,8 @@ std::optional<Outgoing> Audience::Take(int64_t seat, TimePoint now) {
   std::optional<Outgoing> next = taking.outbox.Take();
   if (!next && Serve(taking, now)) next = taking.outbox.Take();
   if (next) taking.waiting_since = now;
-  if (next && std::holds_alternative<FrameToSend>(*next)) {
+  if (taking.interval.count() > 0 && next &&
+      std::holds_alternative<FrameToSend>(*next)) {
     taking.due = now + taking.interval;
   }
   return next;

@@ -176,9 +176,9 @@ void Session::Schedule() {
 }
 
 Session::Step Session::BeginStep() {
-  const auto now = environment_.clock();
   Step step{.deformer = deformer_.get()};
   MutexLock lock(mutex_);
+  const auto now = environment_.clock();
   step.binding_id = binding_id_;
   // Who has joined sees the state as it was before anything newer.
   if (!audience_.MustSeeThis(now)) {

@@ -4,6 +4,7 @@
 
 #include <thread>
 
+#include "absl/cleanup/cleanup.h"
 #include "core/base/error.h"
 #include "deform/v1/session.grpc.pb.h"
 #include "tests/end_to_end/raw_call.h"
@@ -65,6 +66,10 @@ TEST(Deform, EveryPoseGetsItsFrameInOrder) {
     }
     stream.Close();
   });
+  const absl::Cleanup stop = [&] {
+    stream.Cancel();
+    sender.join();
+  };
   Frame frame;
   for (uint64_t i = 0; i <= kPoses; ++i) {
     ASSERT_TRUE(stream.NextFrame(frame).ok());
@@ -74,7 +79,6 @@ TEST(Deform, EveryPoseGetsItsFrameInOrder) {
     ExpectBallAt(frame, {0.01 * static_cast<double>(i), 0, 0});
   }
   EXPECT_EQ(stream.NextFrame(frame).code(), absl::StatusCode::kOutOfRange);
-  sender.join();
 }
 
 TEST(Deform, LeavesFixedHandlesAndClampedPointsAtRest) {

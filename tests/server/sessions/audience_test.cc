@@ -335,6 +335,17 @@ TEST_F(AudienceTest, WhoWantsFewFramesGetsNoneWhileOneIsUnderWay) {
   EXPECT_EQ(audience_.NextDue(), now_ + std::chrono::milliseconds(100));
 }
 
+TEST_F(AudienceTest, WhoWantsAllFramesNeverWaitsForTheClock) {
+  const int64_t seat = Add(Delivery::kEvery);
+  Publish(1);
+  Pass(5);
+  TakeFrame(seat);
+  // A step that has read the clock before the frame was taken.
+  Pass(-5);
+  Publish(2);
+  EXPECT_EQ(TakeFrame(seat).frame->info.revision, 2u);
+}
+
 TEST_F(AudienceTest, AFrameOnAnotherRigOrOneThatEndsTheStreamDoesNotWait) {
   const int64_t seat = AddLimited(float32_);
   Publish(1);

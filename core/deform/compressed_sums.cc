@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "absl/functional/function_ref.h"
 #include "core/kernels/apply_weights.h"
 
 namespace deform {
@@ -34,24 +33,38 @@ void CompressedSums::Copy(int64_t first, int64_t count, double* out) const {
   }
 }
 
+void CompressedSums::ForEach(const CompressedWeights& weights, int64_t count,
+                             ThreadPool* pool,
+                             absl::FunctionRef<void(int64_t)> body) {
+  const bool enough = weights.slot_count() > kParallelPoints;
+  ParallelFor(enough ? pool : nullptr, count, nullptr, body);
+}
+
+std::vector<float> CompressedSums::LeafCoefficients(ThreadPool* pool) const {
+  std::vector<int64_t> first_rows;  // Of the branches.
+  int64_t rows = 0;
+  for (int64_t b = 0; b < weights_.branch_count(); ++b) {
+    first_rows.push_back(rows);
+    rows += weights_.coefficient_rows(b);
+  }
+  std::vector<float> coefficients(rows * 3);
+  ForEach(weights_, weights_.branch_count(), pool, [&](int64_t b) {
+    weights_.CopyCoefficients(b, top_.data(),
+                              coefficients.data() + first_rows[b] * 3);
+  });
+  return coefficients;
+}
+
 void CompressedSums::Apply(const CompressedWeights& weights,
                            std::span<const SumsChange> changes,
                            ThreadPool* pool) {
   const auto sums_of = [](const SumsChange& change) {
     return static_cast<CompressedSums*>(change.sums);
   };
-  const auto in_parallel = [&](int64_t count,
-                               absl::FunctionRef<void(int64_t)> body) {
-    if (pool != nullptr && weights.slot_count() > kParallelPoints) {
-      pool->ParallelFor(count, nullptr, body);
-    } else {
-      for (int64_t i = 0; i < count; ++i) body(i);
-    }
-  };
   for (const SumsChange& change : changes) {
     if (change.full) std::ranges::fill(sums_of(change)->top_, 0.0);
   }
-  in_parallel(weights.cluster_count(), [&](int64_t cluster) {
+  ForEach(weights, weights.cluster_count(), pool, [&](int64_t cluster) {
     for (const SumsChange& change : changes) {
       weights.AddToTop(
           cluster, change.full ? nullptr : change.columns.data(),
@@ -59,7 +72,7 @@ void CompressedSums::Apply(const CompressedWeights& weights,
           change.values.data(), sums_of(change)->top_.data());
     }
   });
-  in_parallel(weights.branch_count(), [&](int64_t branch) {
+  ForEach(weights, weights.branch_count(), pool, [&](int64_t branch) {
     for (const SumsChange& change : changes) {
       weights.ApplyBranch(branch, sums_of(change)->top_.data(),
                           sums_of(change)->sums_.data());

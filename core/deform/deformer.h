@@ -40,7 +40,7 @@ struct DeformReport {
 
 struct DeformJob;
 
-// Not thread-safe: one session, one Deformer.
+// Not thread-safe: one session, one Deformer. Only const calls may run at once.
 class Deformer {
  public:
   // kAutomatic applies only the columns that changed since the last call where
@@ -61,6 +61,14 @@ class Deformer {
 
   // All deformed points, N x 3.
   Positions positions() const;
+
+  // The same without the points, for who holds the leaves of compressed weights
+  // (core/frames/leaf_basis.h): T, and the coefficients of all leaves, 3 floats
+  // for each of CompressedWeights::coefficient_rows(). Empty with dense ones.
+  const AffineMap& map() const { return map_; }
+  std::vector<float> LeafCoefficients() const {
+    return sums_->LeafCoefficients(pool_);
+  }
 
   // Deformed points [first, first + count) relative to `origin`, rounded once:
   // count x dimension floats.

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "core/base/allowance.h"
 #include "core/base/thread_pool.h"
@@ -27,6 +28,12 @@ class WeightedSums {
 
   // Of points [first, first + count): 3 numbers each.
   virtual void Copy(int64_t first, int64_t count, double* out) const = 0;
+
+  // What the leaves of compressed weights make the sums from: 3 floats for each
+  // of CompressedWeights::coefficient_rows(). None of dense ones.
+  virtual std::vector<float> LeafCoefficients(ThreadPool* /*pool*/) const {
+    return {};
+  }
 };
 
 // A change of the sums of one session.

@@ -51,6 +51,7 @@ CompressedWeights::CompressedWeights(Parts parts) : parts_(std::move(parts)) {
     bytes_ += branch.basis.bytes() + branch.leaf_rows.bytes() +
               branch.numbers.bytes() +
               static_cast<int64_t>(branch.leaves.size() * sizeof(Leaf));
+    coefficient_rows_ += branch.leaf_rows.points();
     for (const Leaf& leaf : branch.leaves) {
       slot_count_ =
           std::max(slot_count_, leaf.first_slot + leaf.blocks * kBlockPoints);
@@ -95,25 +96,33 @@ void CompressedWeights::AddToTop(int64_t cluster, const int32_t* index,
                  delta, top + c.first_top * kTileSums);
 }
 
-void CompressedWeights::ApplyBranch(int64_t branch, const double* top,
-                                    float* sums) const {
+void CompressedWeights::CopyCoefficients(int64_t branch, const double* top,
+                                         float* out) const {
   const Branch& b = parts_.branches[branch];
   const Cluster& cluster = parts_.clusters[b.cluster];
   const std::vector<double> g =
       RowsOf(top + cluster.first_top * kTileSums, cluster.basis.points());
   const std::vector<double> h = Product(b.leaf_rows, Product(b.basis, g));
-  std::vector<float> column;
   for (const Leaf& leaf : b.leaves) {
-    column.clear();
-    const double* rows = h.data() + leaf.first_row * 3;
+    const int64_t first = leaf.first_row * 3;
     for (int64_t k = 0; k <= leaf.columns.count(); ++k) {
       const double unit = k > leaf.columns.floats ? leaf.step : 1;
-      for (int d = 0; d < 3; ++d) {
-        column.push_back(static_cast<float>(unit * rows[k * 3 + d]));
+      for (int64_t d = first + k * 3; d < first + k * 3 + 3; ++d) {
+        out[d] = static_cast<float>(unit * h[d]);
       }
     }
+  }
+}
+
+void CompressedWeights::ApplyBranch(int64_t branch, const double* top,
+                                    float* sums) const {
+  const Branch& b = parts_.branches[branch];
+  std::vector<float> coefficients(coefficient_rows(branch) * 3);
+  CopyCoefficients(branch, top, coefficients.data());
+  for (const Leaf& leaf : b.leaves) {
     ApplyMixed(b.numbers.data() + leaf.first_byte, leaf.blocks, leaf.columns,
-               column.data(), sums + leaf.first_slot / kTilePoints * kTileSums);
+               coefficients.data() + leaf.first_row * 3,
+               sums + leaf.first_slot / kTilePoints * kTileSums);
   }
 }
 

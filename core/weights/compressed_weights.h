@@ -99,6 +99,15 @@ class CompressedWeights {
   // cluster. `top` has top_size() doubles.
   void AddToTop(int64_t cluster, const int32_t* index, int64_t changed,
                 const double* delta, double* top) const;
+  // What U of the leaves is multiplied with: h_mean, then one row a column, of
+  // leaf after leaf, branch after branch.
+  int64_t coefficient_rows() const { return coefficient_rows_; }
+  int64_t coefficient_rows(int64_t branch) const {
+    return parts_.branches[branch].leaf_rows.points();
+  }
+  // Those of a branch from g: 3 floats a row. A leaf's step is folded into
+  // those of its integer columns.
+  void CopyCoefficients(int64_t branch, const double* top, float* out) const;
   // Rewrites the sums of a branch's points from g. `sums` has 3 floats per
   // slot, in tiles. Calls for different branches may run in parallel.
   void ApplyBranch(int64_t branch, const double* top, float* sums) const;
@@ -117,6 +126,7 @@ class CompressedWeights {
   Parts parts_;
   int64_t bytes_ = 0;
   int64_t slot_count_ = 0;
+  int64_t coefficient_rows_ = 0;
 };
 
 // Number `k` of the U of a slot of a leaf, in units of its coefficient.

@@ -7,10 +7,12 @@
 //
 // Motions: one cage vertex, or a region around it, along a smooth path of up to
 // 0.15 D, at about 0.5 D/s; the same with jitter of 0.5 % D; and jitter of
-// 0.2 % D of the whole cage. Tolerance: 1e-5 D. Bytes are the mean of all
-// frames but the first; each frame is decoded and compared with the positions
-// that were encoded. CPU time of one core, the best frame. Beside them, in the
-// same run: a copy of the floats, and the plain version of what is packed.
+// 0.2 % D of the whole cage. Tolerance: 1e-5 D; leaf coefficients are of
+// weights compressed to that, and rounded within 3/4 of it, as a server does,
+// but their error is that of both together. Bytes are the mean of all frames
+// but the first; each frame is decoded and compared with the positions that
+// were encoded. CPU time of one core, the best frame. Beside them, in the same
+// run: a copy of the floats, and the plain version of what is packed.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -23,8 +25,10 @@
 
 #include "core/deform/deformer.h"
 #include "core/files/mesh_file.h"
+#include "core/frames/basis_payload.h"
 #include "core/frames/encoding.h"
 #include "core/kernels/grid_blocks.h"
+#include "core/weights/compress_binding.h"
 #include "tests/bench/timing.h"
 #include "tests/support/detailed_model.h"
 
@@ -33,6 +37,7 @@ namespace {
 
 struct Scene {
   std::shared_ptr<const Binding> binding;
+  std::shared_ptr<const Binding> compressed;
   double diagonal;  // D
 };
 
@@ -57,12 +62,14 @@ Mesh Subdivided(const MeshFile& file) {
 
 Scene BindGreen(Mesh model, Cage cage, ThreadPool* pool) {
   const double diagonal = cage.diagonal();
-  return {Bind({.model = std::make_shared<const Mesh>(std::move(model)),
-                .rig = std::move(cage),
-                .scheme = "green"},
-               {.pool = pool})
-              .value(),
-          diagonal};
+  auto dense = Bind({.model = std::make_shared<const Mesh>(std::move(model)),
+                     .rig = std::move(cage),
+                     .scheme = "green"},
+                    {.pool = pool})
+                   .value();
+  auto compressed =
+      CompressBinding(*dense, &dense->weights(), 1e-5, {.pool = pool}).value();
+  return {std::move(dense), std::move(compressed), diagonal};
 }
 
 Scene MakeScene(const char* model, const char* cage, ThreadPool* pool) {
@@ -140,6 +147,17 @@ void Time(double& best, Body body) {
   best = std::min(best, BestCpuSeconds(1, body));
 }
 
+double LargestError(std::span<const float> a, std::span<const float> b) {
+  double largest = 0;
+  for (size_t i = 0; i < a.size(); i += 3) {
+    double squares = 0;
+    for (size_t d = i; d < i + 3; ++d)
+      squares += std::pow(double{a[d]} - b[d], 2);
+    largest = std::max(largest, std::sqrt(squares));
+  }
+  return largest;
+}
+
 // One way to send frames, whole.
 class Way {
  public:
@@ -189,14 +207,8 @@ class Way {
   }
 
   void Compare(std::span<const float> positions) {
-    for (int64_t i = 0; i < points_ * 3; i += 3) {
-      double squares = 0;
-      for (int d = 0; d < 3; ++d) {
-        squares += std::pow(
-            static_cast<double>(positions_[i + d]) - positions[i + d], 2);
-      }
-      cost.error = std::max(cost.error, std::sqrt(squares) / tolerance_);
-    }
+    cost.error =
+        std::max(cost.error, LargestError(positions_, positions) / tolerance_);
   }
 
   const FrameEncoding& encoding_;
@@ -255,6 +267,48 @@ class OnGrid final : public Way {
   std::unique_ptr<Grid> sent_, received_;
 };
 
+// Leaf coefficients, for who holds the leaf bases.
+class OfLeaves {
+ public:
+  // Rounds within `share` of the tolerance.
+  OfLeaves(const Scene& scene, double tolerance, double share)
+      : tolerance_(tolerance),
+        share_(share),
+        basis_(LeafBasis::Of(scene.compressed)),
+        positions_(basis_->point_count() * 3) {}
+
+  Cost cost;
+
+  void Send(const Deformer& deformer, const Vec3& origin,
+            std::span<const float> positions, bool counts) {
+    std::vector<uint8_t> bytes;
+    Time(cost.encode, [&] {
+      bytes = EncodeLeafPose(LeafPoseOf(deformer), *basis_, share_ * tolerance_,
+                             nullptr)
+                  .value();
+    });
+    Time(cost.decode, [&] {
+      if (!PlacePoints(DecodeLeafPose(bytes, *basis_).value(), *basis_, origin,
+                       nullptr, positions_)
+               .ok()) {
+        std::abort();
+      }
+    });
+    cost.error =
+        std::max(cost.error, LargestError(positions_, positions) / tolerance_);
+    if (!counts) return;
+    ++frames_;
+    cost.bytes += (static_cast<double>(bytes.size()) - cost.bytes) / frames_;
+  }
+
+ private:
+  const double tolerance_;
+  const double share_;
+  const std::shared_ptr<const LeafBasis> basis_;
+  std::vector<float> positions_;  // Decoded.
+  int frames_ = 0;
+};
+
 // The plain version of predicting and packing by the reference alone, as the
 // measure of what vectors give.
 double PlainSeconds(const Grid& grid, const Grid& reference) {
@@ -285,23 +339,31 @@ void Measure(const Scene& scene, const PointOrder& order, const Motion& motion,
   const int64_t points = scene.binding->point_count();
   const double tolerance = 1e-5 * scene.diagonal;
   Deformer deformer(scene.binding, pool);
+  Deformer with_leaves(scene.compressed, nullptr);
   Stateless copy("float32", points, tolerance);
   Stateless quantized("quantized16", points, tolerance * 4);
   OnGrid keyframe(order, tolerance, Reference::kNone);
   OnGrid first(order, tolerance, Reference::kFirst);
   OnGrid previous(order, tolerance, Reference::kPrevious);
+  OfLeaves rounded(scene, tolerance, 0.75);
+  OfLeaves as_floats(scene, tolerance, 0);
   std::mt19937 random(1);
   std::vector<float> positions(points * 3);
   const Vec3 origin = scene.binding->model()->box().center();
   for (int frame = -1; frame < frames; ++frame) {
     // The first is the rest pose, whatever the motion.
     if (frame >= 0) {
-      deformer.MoveTo(PoseAt(scene, motion, frame, random));
+      const Pose pose = PoseAt(scene, motion, frame, random);
+      deformer.MoveTo(pose);
+      with_leaves.MoveTo(pose);
     }
     deformer.CopyRelative(0, points, origin, positions.data());
     for (Way* way : std::initializer_list<Way*>{&copy, &quantized, &keyframe,
                                                 &first, &previous}) {
       way->Send(positions, frame > 0);
+    }
+    for (OfLeaves* way : {&rounded, &as_floats}) {
+      way->Send(with_leaves, origin, positions, frame > 0);
     }
   }
   const auto raw = static_cast<double>(points * 12);
@@ -311,6 +373,8 @@ void Measure(const Scene& scene, const PointOrder& order, const Motion& motion,
   Print("predicted, keyframe", keyframe.cost, raw);
   Print("predicted from rest", first.cost, raw);
   Print("predicted from the last", previous.cost, raw);
+  Print("leaf coefficients", rounded.cost, raw);
+  Print("leaf coefficients, floats", as_floats.cost, raw);
   std::printf("  onto the grid %.3f ms, off it %.3f ms\n",
               1e3 * previous.put_on_grid, 1e3 * previous.take_off);
 }
@@ -334,6 +398,10 @@ int main(int argc, char** argv) {
       "decode, largest error in tolerances\n",
       static_cast<long long>(scene.binding->point_count()),
       static_cast<long long>(scene.binding->column_count()));
+  const auto basis = LeafBasis::Of(scene.compressed);
+  std::printf("leaf bases: %.1f KB once, for %lld coefficients\n",
+              static_cast<double>(basis->byte_count()) / 1024,
+              static_cast<long long>(basis->coefficient_rows() * 3));
   for (const bench::Motion& motion : bench::kMotions) {
     bench::Measure(scene, order, motion, frames, &pool);
   }

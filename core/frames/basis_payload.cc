@@ -127,6 +127,7 @@ absl::StatusOr<std::vector<uint8_t>> EncodeLeafPose(const LeafPose& pose,
                                                     double tolerance,
                                                     ThreadPool* pool) {
   assert(std::ssize(pose.coefficients) == basis.coefficient_rows() * 3);
+  assert(tolerance >= 0);
   const int dimension = basis.dimension();
   DEFORM_RETURN_IF_ERROR(CheckNumbers(pose, dimension));
   std::vector<uint8_t> bytes;

@@ -47,7 +47,8 @@ class LeafRounder {
         tolerance_(tolerance),
         lost_(leaf.rows() * 3) {}
 
-  // What rounding loses, in tolerances; infinity if steps are too many.
+  // What rounding loses, in tolerances; infinity if steps are too many or too
+  // large.
   double Round(int scale, std::vector<int32_t>& numbers) {
     numbers.resize(leaf_.rows() * dimension_);
     for (int64_t k = 0; k < leaf_.rows(); ++k) {
@@ -56,11 +57,11 @@ class LeafRounder {
       for (int d = 0; d < dimension_; ++d) {
         const double meant = coefficients_[k * 3 + d];
         const double steps = std::nearbyint(meant / step);
-        if (!(std::abs(steps) <= kMostSteps)) {
+        const double told = static_cast<float>(steps * step);
+        if (!(std::abs(steps) <= kMostSteps && std::isfinite(told))) {
           return std::numeric_limits<double>::infinity();
         }
         numbers[k * dimension_ + d] = static_cast<int32_t>(steps);
-        const double told = static_cast<float>(steps * step);
         lost_[k * 3 + d] = static_cast<float>((meant - told) / tolerance_);
       }
     }

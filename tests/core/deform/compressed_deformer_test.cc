@@ -125,6 +125,25 @@ TEST(CompressedDeformer, LeavesUnboundPointsAtRest) {
   EXPECT_NE(deformer.positions().row(6), dense->model()->positions().row(6));
 }
 
+// Const calls may run at once.
+TEST(CompressedDeformer, TellsTheSameLeafCoefficientsToManyAtOnce) {
+  const BindingPtr dense = Dense(12000);
+  ThreadPool pool({.threads = 3});
+  Deformer deformer(Compressed(*dense, 1e-4), &pool);
+  const int64_t rows = deformer.binding().compressed()->coefficient_rows();
+  EXPECT_EQ(deformer.LeafCoefficients(), std::vector<float>(rows * 3, 0.0F));
+  deformer.MoveTo(RandomPose(*dense, 1));
+  std::vector<std::vector<float>> told(8);
+  pool.ParallelFor(8, nullptr,
+                   [&](int64_t i) { told[i] = deformer.LeafCoefficients(); });
+  EXPECT_NE(told[0], std::vector<float>(rows * 3, 0.0F));
+  for (const auto& coefficients : told) EXPECT_EQ(coefficients, told[0]);
+}
+
+TEST(CompressedDeformer, HasNoLeafCoefficientsWithDenseWeights) {
+  EXPECT_TRUE(Deformer(Dense(100), nullptr).LeafCoefficients().empty());
+}
+
 TEST(CompressedDeformer, MovesTogetherAsAlone) {
   const BindingPtr binding = Compressed(*Dense(12000), 1e-4);
   ThreadPool pool({.threads = 3});

@@ -11,6 +11,7 @@
 #include "core/frames/basis_payload.h"
 #include "tests/core/frames/leaf_bases.h"
 #include "tests/support/detailed_model.h"
+#include "tests/support/instruction_sets.h"
 
 namespace deform {
 namespace {
@@ -75,8 +76,8 @@ class Session {
 
 // D of the rigs of InBall().
 constexpr double kDiagonal = 3.4;
-// Positions of up to 3 and their sums are rounded to float on both sides, some
-// units of 2^-24 of that.
+// Positions of up to 3, and the sums in them, are rounded to float on both
+// sides: six times by 2^-24 of that or less.
 constexpr double kRounding = 3 * 6 * 6e-8;
 
 class LeafPoses
@@ -166,6 +167,23 @@ TEST(LeafPose, IsTheSameOnAllThreads) {
   EXPECT_EQ(together.Frame(1e-4), frame);
   EXPECT_EQ(together.Received(frame, Vec3::Zero()),
             alone.Received(frame, Vec3::Zero()));
+}
+
+// Float sums of some thirty terms of up to D are made in another order, or
+// multiplied and added in two steps.
+constexpr double kOtherSums = 30 * 6e-8 * kDiagonal;
+
+TEST(LeafPose, ComesOutNearlySoWithOtherVectorInstructions) {
+  const auto binding =
+      Bind(InBall(**FindScheme("green"), 3, 1500, 1e-5), {}).value();
+  Session session(binding);
+  session.MoveTo(Shaken(*binding, 1, 0.2));
+  const auto frame = session.Frame(0);
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    const OnInstructionSet on(target);
+    EXPECT_LE(session.Error(frame, Vec3::Zero()), kOtherSums)
+        << hwy::TargetName(target);
+  }
 }
 
 TEST(LeafPose, LeavesFixedPointsAtRest) {

@@ -20,7 +20,7 @@ void EditHistory::Record(uint64_t edit, const PoseUpdate& update,
   for (int64_t i = 0; i < count; ++i) {
     const Vec3 now = pose.vertices.row(vertex(i)).transpose();
     Places& places =
-        into.vertices.try_emplace(vertex(i), now, now).first->second;
+        into.vertices.try_emplace(vertex(i), Places{now, now}).first->second;
     // Somebody else wrote between two poses of this edit: theirs is what was
     // before.
     if (places.after != now) places = {now, now};

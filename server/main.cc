@@ -101,11 +101,16 @@ int Main(int argc, char** argv) {
     return kBadUsage;
   }
   if (!line->restore.empty()) {
-    status = RestoreBackup(PosixFileSystem(), nullptr, line->restore,
-                           line->options.data_dir);
-    if (!status.ok()) {
-      std::cerr << "deformd: " << status.message() << "\n";
+    const auto left_out = RestoreBackup(PosixFileSystem(), nullptr,
+                                        line->restore, line->options.data_dir);
+    if (!left_out.ok()) {
+      std::cerr << "deformd: " << left_out.status().message() << "\n";
       return 1;
+    }
+    for (const std::string& file : *left_out) {
+      std::cerr << "deformd: " << file
+                << " is damaged and was left out: these weights will be "
+                   "computed again\n";
     }
   }
   ReturnLargeBlocks();

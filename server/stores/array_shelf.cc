@@ -26,6 +26,10 @@ std::string WeightsFile(const StoreKey& binding, const WeightsForm& form) {
                       form.name, "-", form.version);
 }
 
+bool IsWeightsFile(absl::string_view name) {
+  return absl::StartsWith(name, "weights/");
+}
+
 ArrayShelf::Claim::~Claim() {
   if (shelf_ == nullptr) return;
   MutexLock lock(shelf_->mutex_);

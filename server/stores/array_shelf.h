@@ -12,6 +12,7 @@
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include "core/base/mutex.h"
 #include "server/stores/file_system.h"
 #include "server/stores/records.h"
@@ -22,6 +23,7 @@ namespace deform::server {
 std::string ModelFile(const StoreKey& model);
 // "weights/<tenant>/<id>.<form>-<version>".
 std::string WeightsFile(const StoreKey& binding, const WeightsForm& form);
+bool IsWeightsFile(absl::string_view name);
 
 // Thread-safe. A file appears whole or not at all, and never changes.
 class ArrayShelf {

@@ -6,6 +6,7 @@
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
 #include "server/stores/array_file.h"
+#include "server/stores/array_shelf.h"
 #include "server/stores/files.h"
 #include "server/stores/store_database.h"
 
@@ -75,9 +76,10 @@ absl::Status BackupWriter::Add(const std::string& name) {
   return SyncFolder(files_, FolderOf(to));
 }
 
-absl::Status RestoreBackup(FileSystem& files, const char* vfs,
-                           const std::string& backup,
-                           const std::string& directory) {
+absl::StatusOr<std::vector<std::string>> RestoreBackup(
+    FileSystem& files, const char* vfs, const std::string& backup,
+    const std::string& directory) {
+  std::vector<std::string> left_out;
   DEFORM_RETURN_IF_ERROR(CheckNew(files, directory));
   const std::string partial = absl::StrCat(directory, ".partial");
   DEFORM_RETURN_IF_ERROR(MakePartial(files, partial));
@@ -92,14 +94,20 @@ absl::Status RestoreBackup(FileSystem& files, const char* vfs,
       const std::string to = absl::StrCat(partial, "/", name);
       DEFORM_ASSIGN_OR_RETURN(const bool there, Exists(files, from));
       if (!there) continue;  // Neither did the store have it.
-      DEFORM_RETURN_IF_ERROR(ReadArrayFile(files, from, name).status());
+      const absl::Status sound = ReadArrayFile(files, from, name).status();
+      if (IsWeightsFile(name) && DetailOf(sound).reason == "FILE_DAMAGED") {
+        left_out.push_back(from);
+        continue;
+      }
+      DEFORM_RETURN_IF_ERROR(sound);
       DEFORM_RETURN_IF_ERROR(MakeFoldersOf(files, partial, name));
       DEFORM_RETURN_IF_ERROR(CopyFile(files, from, to));
       DEFORM_RETURN_IF_ERROR(SyncFolder(files, FolderOf(to)));
     }
   }
   DEFORM_RETURN_IF_ERROR(SyncFolder(files, partial));
-  return RenameFile(files, partial, directory);
+  DEFORM_RETURN_IF_ERROR(RenameFile(files, partial, directory));
+  return left_out;
 }
 
 }  // namespace deform::server

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "server/stores/file_system.h"
 
 namespace deform::server {
@@ -40,11 +41,12 @@ class BackupWriter {
 };
 
 // Makes the data directory `directory`, which must not exist, from a backup.
-// Every array is verified first, so that nothing damaged comes back: DataLoss
-// FILE_DAMAGED, CATALOGUE_DAMAGED; FailedPrecondition DIRECTORY_EXISTS,
-// DIRECTORY_IN_USE, FORMAT_TOO_NEW. `vfs` as in StoreOptions.
-absl::Status RestoreBackup(FileSystem& files, const char* vfs,
-                           const std::string& backup,
-                           const std::string& directory);
+// Every array is verified first, so that nothing damaged comes back. Damaged
+// weights are left out, since they can be computed again: returns their files.
+// Else DataLoss FILE_DAMAGED, CATALOGUE_DAMAGED; FailedPrecondition
+// DIRECTORY_EXISTS, DIRECTORY_IN_USE, FORMAT_TOO_NEW. `vfs` as in StoreOptions.
+absl::StatusOr<std::vector<std::string>> RestoreBackup(
+    FileSystem& files, const char* vfs, const std::string& backup,
+    const std::string& directory);
 
 }  // namespace deform::server

@@ -375,15 +375,16 @@ TEST_F(SqliteStoreTest, BacksUpWhileOthersWriteAndComesBack) {
 TEST_F(SqliteStoreTest, CopiesOverNothing) {
   ASSERT_TRUE(store_->Backup("/backup").ok());
   EXPECT_EQ(ReasonOf(store_->Backup("/backup")), "DIRECTORY_EXISTS");
-  EXPECT_EQ(ReasonOf(RestoreBackup(disk_, disk_.vfs(), "/backup", "/data")),
-            "DIRECTORY_EXISTS");
+  EXPECT_EQ(
+      ReasonOf(RestoreBackup(disk_, disk_.vfs(), "/backup", "/data").status()),
+      "DIRECTORY_EXISTS");
 }
 
 TEST_F(SqliteStoreTest, RestoresNothingThatIsDamaged) {
   ASSERT_TRUE(store_->Backup("/backup").ok());
   Damage("/backup/models/ann/model");
   const absl::Status status =
-      RestoreBackup(disk_, disk_.vfs(), "/backup", "/again");
+      RestoreBackup(disk_, disk_.vfs(), "/backup", "/again").status();
   EXPECT_EQ(ReasonOf(status), "FILE_DAMAGED");
   EXPECT_THAT(status.message(), HasSubstr("/backup/models/ann/model"));
   for (const std::string& file : disk_.Files()) {
@@ -391,10 +392,25 @@ TEST_F(SqliteStoreTest, RestoresNothingThatIsDamaged) {
   }
   // What is left of it is named to who tries again.
   const absl::Status again =
-      RestoreBackup(disk_, disk_.vfs(), "/backup", "/again");
+      RestoreBackup(disk_, disk_.vfs(), "/backup", "/again").status();
   EXPECT_EQ(ReasonOf(again), "DIRECTORY_EXISTS");
   EXPECT_THAT(again.message(), HasSubstr("/again.partial is there, left of a"));
   EXPECT_THAT(again.message(), HasSubstr("remove it"));
+}
+
+TEST_F(SqliteStoreTest, RestoresAllButWeightsThatAreDamaged) {
+  ASSERT_TRUE(
+      store_->PutWeights(Key("bound"), {"tiles", 1}, ArraysOf("many")).ok());
+  ASSERT_TRUE(store_->Backup("/backup").ok());
+  const std::string weights = "/backup/weights/ann/bound.tiles-1";
+  Damage(weights);
+  EXPECT_EQ(RestoreBackup(disk_, disk_.vfs(), "/backup", "/again").value(),
+            std::vector<std::string>{weights});
+  const auto again = MustOpen(On(disk_, "/again"));
+  EXPECT_EQ(TextOf(*again->ModelArrays(Key("model"))), "mesh");
+  // They are to be computed again.
+  EXPECT_FALSE(again->Weights(Key("bound")).ok());
+  EXPECT_EQ(again->Load()->bindings.size(), store_->Load()->bindings.size());
 }
 
 TEST_F(SqliteStoreTest, ABackupThatFailedIsNotTakenForOne) {
@@ -404,6 +420,7 @@ TEST_F(SqliteStoreTest, ABackupThatFailedIsNotTakenForOne) {
     if (store_->Backup(target).ok()) continue;
     EXPECT_EQ(
         RestoreBackup(disk_, disk_.vfs(), target, absl::StrCat("/again", at))
+            .status()
             .code(),
         absl::StatusCode::kNotFound)
         << "call " << at;

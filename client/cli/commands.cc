@@ -10,6 +10,7 @@
   X(List)                  \
   X(Show)                  \
   X(Delete)                \
+  X(Download)              \
   X(Weights)               \
   X(Report)                \
   X(Compare)               \

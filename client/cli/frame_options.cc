@@ -1,6 +1,7 @@
 #include "client/cli/frame_options.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
@@ -37,9 +38,18 @@ void FrameOptions::AddTo(CLI::App& app) {
       ->capture_default_str();
   app.add_option("--encoding", encodings,
                  "Frame encodings to accept, best first; auto: the one that "
-                 "takes fewest bytes")
+                 "takes fewest bytes; pose: only the pose comes, and this "
+                 "program deforms, with weights that it downloads before")
       ->delimiter(',')
       ->type_name("NAME");
+}
+
+bool FrameOptions::NeedsWeights() const {
+  return std::any_of(
+      encodings.begin(), encodings.end(), [](const std::string& name) {
+        const FrameEncoding* const encoding = FindEncoding(name);
+        return encoding != nullptr && encoding->needs() != Needs::kNothing;
+      });
 }
 
 absl::StatusOr<DeformOptions> FrameOptions::For(Delivery delivery) const {

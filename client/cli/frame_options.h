@@ -15,6 +15,9 @@ namespace deform::cli {
 
 struct FrameOptions {
   std::vector<std::string> encodings;
+
+  // One of the encodings is for clients that hold the weights.
+  bool NeedsWeights() const;
   double tolerance = 0;  // Of the rig's diagonal; 0: exact frames.
 
   void AddTo(CLI::App& app);

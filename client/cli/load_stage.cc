@@ -181,6 +181,10 @@ absl::Status LoadStage::AddTarget(const LoadStageOptions& options,
        .point_count = binding.point_count,
        .pattern = std::make_shared<const PosePattern>(std::move(pattern)),
        .judge = std::move(judge)});
+  if (options.hold_weights) {
+    DEFORM_ASSIGN_OR_RETURN(targets_.back().weights,
+                            client_.DownloadBinding(binding.binding_id));
+  }
   return absl::OkStatus();
 }
 

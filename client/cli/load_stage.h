@@ -27,6 +27,7 @@ struct LoadStageOptions {
   bool check = true;
   double tolerance = 1e-6;  // Beside that of compressed weights and:
   double frame_tolerance = 0;
+  bool hold_weights = false;  // Participants deform by themselves.
 };
 
 // "drag", "jitter", "whole", "recorded".

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/status/statusor.h"
 #include "core/mesh/mesh.h"
 #include "core/mesh/rig.h"
 #include "core/mesh/types.h"
@@ -59,6 +60,9 @@ struct RigArrays {
   Faces faces;         // F x dimension.
   Positions fixed;     // Rows x 3: handles that no pose moves.
 };
+
+// InvalidArgument: what Cage::Create() and Handles::Create() refuse.
+absl::StatusOr<Rig> RigOf(const RigArrays& arrays);
 
 // How a model is to be bound.
 struct BindingSpec {

@@ -6,25 +6,18 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
+#include "client/cpp/client_impl.h"
 #include "client/cpp/convert.h"
 #include "client/cpp/deform_call_impl.h"
 #include "client/cpp/deform_stream_impl.h"
 #include "client/cpp/status.h"
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
-#include "deform/v1/binding.grpc.pb.h"
-#include "deform/v1/model.grpc.pb.h"
-#include "deform/v1/server.grpc.pb.h"
-#include "deform/v1/session.grpc.pb.h"
 
 namespace deform {
 namespace {
 
 constexpr int64_t kUploadChunkBytes = int64_t{1} << 20;
-
-std::string ToString(absl::string_view text) {
-  return std::string(text.data(), text.size());
-}
 
 // Frames are large and few: wide windows and HTTP/2 frames, no probing of the
 // connection's speed. Connections come back fast and are watched with pings.
@@ -43,92 +36,39 @@ grpc::ChannelArguments ChannelArguments() {
   return arguments;
 }
 
+v1::Join JoinOf(absl::string_view session_id, const std::string& tenant,
+                const DeformOptions& wanted) {
+  v1::Join join;
+  join.set_tenant(tenant);
+  join.set_session_id(ToString(session_id));
+  join.set_delivery(wanted.delivery == Delivery::kEvery ? v1::DELIVERY_EVERY
+                                                        : v1::DELIVERY_LATEST);
+  join.set_role(wanted.role == ParticipantRole::kViewer ? v1::ROLE_VIEWER
+                                                        : v1::ROLE_EDITOR);
+  join.set_name(wanted.name);
+  join.set_presence(wanted.on_participants != nullptr);
+  join.set_max_fps(wanted.max_fps);
+  join.set_normals(wanted.normals);
+  if (wanted.tolerance) join.set_tolerance(*wanted.tolerance);
+  if (wanted.tolerance_fraction) {
+    join.set_tolerance_fraction(*wanted.tolerance_fraction);
+  }
+  join.mutable_held()->set_binding_id(wanted.weights.binding_id);
+  join.mutable_encodings()->Add(wanted.encodings.begin(),
+                                wanted.encodings.end());
+  if (!wanted.encodings.empty()) return join;
+  const bool holds = wanted.weights.binding != nullptr;
+  const bool inexact = wanted.tolerance || wanted.tolerance_fraction;
+  join.set_cheapest_encoding(inexact || holds);
+  for (const FrameEncoding* encoding : AllEncodings()) {
+    if (!inexact && !encoding->is_exact()) continue;
+    if (!holds && encoding->needs() != Needs::kNothing) continue;
+    join.add_encodings(ToString(encoding->id()));
+  }
+  return join;
+}
+
 }  // namespace
-
-struct Client::Impl {
-  Impl(std::shared_ptr<grpc::Channel> shared, const ClientOptions& chosen)
-      : channel(std::move(shared)),
-        options(chosen),
-        models(v1::ModelService::NewStub(channel)),
-        bindings(v1::BindingService::NewStub(channel)),
-        sessions(v1::SessionService::NewStub(channel)),
-        server(v1::ServerService::NewStub(channel)) {}
-
-  // A call without work behind it.
-  template <typename Stub, typename Method, typename Request, typename Response>
-  absl::Status Call(Stub& stub, Method method, const Request& request,
-                    Response* response) {
-    grpc::ClientContext context;
-    context.set_wait_for_ready(true);
-    context.set_deadline(std::chrono::system_clock::now() +
-                         options.call_timeout);
-    return FromGrpc((stub.*method)(&context, request, response));
-  }
-
-  // All pages of a list; `read` takes one.
-  template <typename Response, typename Stub, typename Method, typename Request,
-            typename Read>
-  absl::Status CallPages(Stub& stub, Method method, Request request,
-                         Read read) {
-    request.set_tenant(options.tenant);
-    do {
-      Response response;
-      DEFORM_RETURN_IF_ERROR(Call(stub, method, request, &response));
-      read(response);
-      request.set_page_token(response.next_page_token());
-    } while (!request.page_token().empty());
-    return absl::OkStatus();
-  }
-
-  absl::StatusOr<v1::GetBindingResponse> GetBinding(
-      absl::string_view binding_id, bool with_rig) {
-    v1::GetBindingRequest request;
-    request.set_tenant(options.tenant);
-    request.set_binding_id(ToString(binding_id));
-    request.set_with_rig(with_rig);
-    v1::GetBindingResponse response;
-    DEFORM_RETURN_IF_ERROR(Call(
-        *bindings, &v1::BindingService::Stub::GetBinding, request, &response));
-    return response;
-  }
-
-  v1::Join JoinOf(absl::string_view session_id,
-                  const DeformOptions& wanted) const {
-    v1::Join join;
-    join.set_tenant(options.tenant);
-    join.set_session_id(ToString(session_id));
-    join.set_delivery(wanted.delivery == Delivery::kEvery
-                          ? v1::DELIVERY_EVERY
-                          : v1::DELIVERY_LATEST);
-    join.set_role(wanted.role == ParticipantRole::kViewer ? v1::ROLE_VIEWER
-                                                          : v1::ROLE_EDITOR);
-    join.set_name(wanted.name);
-    join.set_presence(wanted.on_participants != nullptr);
-    join.set_max_fps(wanted.max_fps);
-    join.set_normals(wanted.normals);
-    if (wanted.tolerance) join.set_tolerance(*wanted.tolerance);
-    if (wanted.tolerance_fraction) {
-      join.set_tolerance_fraction(*wanted.tolerance_fraction);
-    }
-    join.mutable_encodings()->Add(wanted.encodings.begin(),
-                                  wanted.encodings.end());
-    if (!wanted.encodings.empty()) return join;
-    const bool inexact = wanted.tolerance || wanted.tolerance_fraction;
-    join.set_cheapest_encoding(inexact);
-    for (const FrameEncoding* encoding : AllEncodings()) {
-      if (!inexact && !encoding->is_exact()) continue;
-      join.add_encodings(ToString(encoding->id()));
-    }
-    return join;
-  }
-
-  const std::shared_ptr<grpc::Channel> channel;
-  const ClientOptions options;
-  const std::unique_ptr<v1::ModelService::Stub> models;
-  const std::unique_ptr<v1::BindingService::Stub> bindings;
-  const std::unique_ptr<v1::SessionService::Stub> sessions;
-  const std::unique_ptr<v1::ServerService::Stub> server;
-};
 
 absl::StatusOr<Client> Client::Connect(absl::string_view target,
                                        const ClientOptions& options) {
@@ -305,31 +245,6 @@ absl::Status Client::DeleteBinding(absl::string_view binding_id) {
                      request, &response);
 }
 
-absl::Status Client::GetWeights(
-    absl::string_view binding_id, WeightPrecision precision, int64_t first,
-    int64_t count, absl::FunctionRef<absl::Status(const WeightRows&)> rows) {
-  v1::GetWeightsRequest request;
-  request.set_tenant(impl_->options.tenant);
-  request.set_binding_id(ToString(binding_id));
-  request.set_precision(precision == WeightPrecision::kRecomputedFloat64
-                            ? v1::WEIGHT_PRECISION_RECOMPUTED_FLOAT64
-                            : v1::WEIGHT_PRECISION_CACHED_FLOAT32);
-  request.set_first_point(first);
-  request.set_point_count(count);
-  grpc::ClientContext context;
-  const auto call = impl_->bindings->GetWeights(&context, request);
-  v1::GetWeightsResponse response;
-  absl::Status status;
-  while (call->Read(&response)) {
-    if (!status.ok()) continue;  // The cancelled call is read to its end.
-    const absl::StatusOr<WeightRows> part = FromProto(response);
-    status = part.ok() ? rows(*part) : part.status();
-    if (!status.ok()) context.TryCancel();
-  }
-  const absl::Status end = FromGrpc(call->Finish());
-  return status.ok() ? end : status;
-}
-
 absl::StatusOr<QualityInfo> Client::GetQuality(
     const QualityQuery& query, const ProgressCallback& progress) {
   v1::GetQualityRequest request;
@@ -446,7 +361,7 @@ absl::StatusOr<DeformStream> Client::Deform(absl::string_view session_id,
                                             const DeformOptions& options) {
   auto stream = std::make_unique<DeformStream::Impl>(
       std::shared_ptr<v1::SessionService::Stub>(impl_, impl_->sessions.get()),
-      impl_->JoinOf(session_id, options), options);
+      JoinOf(session_id, impl_->options.tenant, options), options);
   DEFORM_RETURN_IF_ERROR(stream->Join());
   return DeformStream(std::move(stream));
 }
@@ -459,8 +374,9 @@ absl::StatusOr<DeformStream> Client::Deform(absl::string_view session_id,
 std::unique_ptr<DeformCall> Client::StartDeform(absl::string_view session_id,
                                                 const DeformOptions& options,
                                                 DeformEvents& events) {
-  return StartDeformCall(*impl_->sessions, impl_->JoinOf(session_id, options),
-                         events);
+  return StartDeformCall(*impl_->sessions,
+                         JoinOf(session_id, impl_->options.tenant, options),
+                         options, events);
 }
 
 }  // namespace deform

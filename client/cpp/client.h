@@ -45,8 +45,8 @@ struct ClientOptions {
   // How long Connect() waits for the server.
   std::chrono::milliseconds connect_timeout{5000};
   // How long a call without work behind it may take (all but RegisterModel,
-  // CreateBinding, GetWeights, GetQuality and Deform, which take as long as
-  // they need).
+  // CreateBinding, GetWeights, GetQuality, Deform and downloads, which take as
+  // long as they need).
   std::chrono::milliseconds call_timeout{30000};
   // Clients of one server in one program share a connection, unless they want
   // one of their own.
@@ -77,7 +77,7 @@ struct QualityQuery {
   bool with_points = false;
 };
 
-// Done and total: bytes of an upload, points of a binding or a report. Called
+// Done and total: bytes of a model, points of a binding or a report. Called
 // on the calling thread. False gives up: the server stops and the call returns
 // Cancelled.
 using ProgressCallback = std::function<bool(int64_t done, int64_t total)>;
@@ -102,6 +102,9 @@ class Client {
       const ModelArrays& model, absl::string_view display_name,
       const ProgressCallback& progress = {});
   absl::StatusOr<ModelInfo> GetModel(absl::string_view model_id);
+  // The arrays of a model as they were registered, faces included.
+  absl::StatusOr<ModelArrays> DownloadModel(
+      absl::string_view model_id, const ProgressCallback& progress = {});
   absl::StatusOr<std::vector<ModelInfo>> ListModels();
   absl::Status DeleteModel(absl::string_view model_id);
 
@@ -127,6 +130,12 @@ class Client {
   absl::Status GetWeights(
       absl::string_view binding_id, WeightPrecision precision, int64_t first,
       int64_t count, absl::FunctionRef<absl::Status(const WeightRows&)> rows);
+
+  // The model, the rig and the weights of a binding, to deform by oneself
+  // (core/deform/deformer.h) or to receive poses instead of frames
+  // (DeformOptions::weights). N x C floats; CompressBinding() makes them fewer.
+  absl::StatusOr<HeldBinding> DownloadBinding(
+      absl::string_view binding_id, const ProgressCallback& progress = {});
 
   // How a binding came out, and what a pose does to its model.
   absl::StatusOr<QualityInfo> GetQuality(const QualityQuery& query,

@@ -25,8 +25,11 @@ class Call final
       private grpc::ClientBidiReactor<v1::DeformRequest, v1::DeformResponse> {
  public:
   Call(v1::SessionService::Stub& stub, const v1::Join& join,
-       DeformEvents& events)
-      : events_(events), normals_(join.normals()) {
+       const DeformOptions& options, DeformEvents& events)
+      : events_(events),
+        normals_(options.normals),
+        held_weights_(options.weights),
+        weights_(options.pool) {
     MutexLock lock(mutex_);  // What is set up here is seen by reactions.
     stub.async()->Deform(&context_, this);
     *request_.mutable_join() = join;
@@ -113,6 +116,8 @@ class Call final
       case v1::DeformResponse::kRigChanged: {
         DEFORM_ASSIGN_OR_RETURN(const RigChange change,
                                 FromProto(response_.rig_changed(), dimension_));
+        if (!assembler_) return NotJoined();
+        assembler_->BeginBinding(change.binding_id);
         events_.OnRigChange(change);
         return absl::OkStatus();
       }
@@ -134,7 +139,13 @@ class Call final
   absl::Status HandleJoined() {
     DEFORM_ASSIGN_OR_RETURN(const JoinedSession joined,
                             FromProto(response_.joined()));
-    assembler_.emplace(joined.dimension, joined.point_count, normals_);
+    if (held_weights_.binding != nullptr) {
+      DEFORM_RETURN_IF_ERROR(HeldWeights::Check(held_weights_, joined));
+      weights_.Add(held_weights_, joined.binding_id);
+    }
+    assembler_.emplace(joined.dimension, joined.point_count, normals_,
+                       &weights_);
+    assembler_->BeginBinding(joined.binding_id);
     {
       MutexLock lock(mutex_);
       dimension_ = joined.dimension;
@@ -165,6 +176,7 @@ class Call final
 
   DeformEvents& events_;
   const bool normals_;  // Were asked for.
+  const HeldBinding held_weights_;
   grpc::ClientContext context_;
 
   // The reading side's. Its reactions come one after the other, on any thread;
@@ -172,6 +184,7 @@ class Call final
   // see into gRPC.
   std::atomic<bool> turn_ = false;
   v1::DeformResponse response_;
+  HeldWeights weights_;
   std::optional<FrameAssembler> assembler_;
   Frame frame_;
   absl::Status in_band_;
@@ -192,8 +205,9 @@ class Call final
 
 std::unique_ptr<DeformCall> StartDeformCall(v1::SessionService::Stub& stub,
                                             const v1::Join& join,
+                                            const DeformOptions& options,
                                             DeformEvents& events) {
-  return std::make_unique<Call>(stub, join, events);
+  return std::make_unique<Call>(stub, join, options, events);
 }
 
 }  // namespace deform

@@ -8,9 +8,10 @@
 
 namespace deform {
 
-// `events` is borrowed until OnEnd() has returned.
+// `join` says how; `events` is borrowed until OnEnd() has returned.
 std::unique_ptr<DeformCall> StartDeformCall(v1::SessionService::Stub& stub,
                                             const v1::Join& join,
+                                            const DeformOptions& options,
                                             DeformEvents& events);
 
 }  // namespace deform

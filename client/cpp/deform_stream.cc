@@ -86,6 +86,9 @@ absl::Status DeformStream::RequestKeyframe() {
 const std::vector<RigChange>& DeformStream::rig_changes() const {
   return impl_->rig_changes();
 }
+absl::Status DeformStream::Hold(const HeldBinding& weights) {
+  return impl_->Hold(weights);
+}
 absl::Status DeformStream::NextFrame(Frame& frame) {
   return impl_->NextFrame(frame);
 }

@@ -18,6 +18,15 @@
 
 namespace deform {
 
+class Binding;
+class ThreadPool;
+
+// A binding of the server's that this program has, in whatever form.
+struct HeldBinding {
+  std::string binding_id;
+  std::shared_ptr<const Binding> binding;
+};
+
 // Which frames a participant gets.
 enum class Delivery {
   kLatest,  // The newest state whenever there is room; poses may merge.
@@ -61,8 +70,9 @@ struct DeformOptions {
   // take a fraction of the bytes.
   std::optional<double> tolerance;
   std::optional<double> tolerance_fraction;
-  // Frame encodings to choose from, best first (frame.proto). Empty: "float32",
-  // or, with a tolerance, whichever takes fewest bytes.
+  // Frame encodings to choose from, best first (frame.proto). Empty: "pose" if
+  // there are `weights`; else "float32", or, with a tolerance, whichever takes
+  // fewest bytes.
   std::vector<std::string> encodings;
   // With kLatest, frames a second at most, 0.01 to 1000; 0: as they come. The
   // last state always comes.
@@ -70,6 +80,11 @@ struct DeformOptions {
   // Frames come with Frame::normals; FailedPrecondition NO_NORMALS if the model
   // has no faces, or two dimensions.
   bool normals = false;
+  // The session's binding (Client::DownloadBinding): with it frames can come as
+  // poses (encoding "pose") and are deformed here, on `pool` (borrowed; may be
+  // null). Frame::error_bound is then that of these weights.
+  HeldBinding weights = {};
+  ThreadPool* pool = nullptr;
 
   ParticipantRole role = ParticipantRole::kEditor;
   std::string name;  // Shown to others; at most 64 bytes.
@@ -236,6 +251,10 @@ class DeformStream {
   // How the rig has changed since joining, as of the last frame; part of the
   // receiving side.
   const std::vector<RigChange>& rig_changes() const;
+  // These are DeformOptions::weights from now on; part of the receiving side.
+  // After a rig change frames come in another encoding until the weights of its
+  // binding are here. InvalidArgument OTHER_MODEL.
+  absl::Status Hold(const HeldBinding& weights);
 
   // Part of the receiving side: who takes part, if on_participants is set; what
   // came with the last refusal; how often the connection broke and came back.

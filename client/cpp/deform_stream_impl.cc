@@ -30,6 +30,7 @@ DeformStream::Impl::Impl(std::shared_ptr<v1::SessionService::Stub> stub,
     : stub_(std::move(stub)),
       options_(options),
       join_(std::move(join)),
+      weights_(options.pool),
       backoff_(
           options.reconnect_for,
           [] { return std::chrono::steady_clock::now(); },
@@ -49,6 +50,10 @@ absl::Status DeformStream::Impl::Join() {
   auto link = std::make_shared<DeformLink>(*stub_);
   DEFORM_ASSIGN_OR_RETURN(const v1::Joined joined, link->Join(join_));
   DEFORM_ASSIGN_OR_RETURN(joined_, FromProto(joined));
+  if (options_.weights.binding != nullptr) {
+    DEFORM_RETURN_IF_ERROR(HeldWeights::Check(options_.weights, joined_));
+    weights_.Add(options_.weights, binding_id());
+  }
   return Adopt(std::move(link), joined);
 }
 
@@ -187,11 +192,8 @@ absl::Status DeformStream::Impl::TryToReconnect() {
                      "the session has another model than before",
                      {.reason = "OTHER_MODEL"});
   }
-  const std::string& binding = rig_changes_.empty()
-                                   ? joined_.binding_id
-                                   : rig_changes_.back().binding_id;
   const bool kept = joined.resumed() && joined.session().epoch() == epoch_;
-  if (!kept && now.binding_id != binding) {
+  if (!kept && now.binding_id != binding_id()) {
     return MakeError(absl::StatusCode::kFailedPrecondition,
                      "the rig has changed while the stream was broken, and its "
                      "place was not kept: join anew",
@@ -204,7 +206,9 @@ absl::Status DeformStream::Impl::TryToReconnect() {
 absl::Status DeformStream::Impl::Adopt(std::shared_ptr<DeformLink> link,
                                        const v1::Joined& joined) {
   reader_ = link;
-  assembler_.emplace(joined_.dimension, joined_.point_count, options_.normals);
+  assembler_.emplace(joined_.dimension, joined_.point_count, options_.normals,
+                     &weights_);
+  assembler_->BeginBinding(binding_id());
   may_repeat_ = last_revision_.has_value();
   join_.mutable_resume()->set_token(joined.resume_token());
   known_.clear();
@@ -243,6 +247,20 @@ absl::Status DeformStream::Impl::Adopt(std::shared_ptr<DeformLink> link,
   return absl::OkStatus();
 }
 
+const std::string& DeformStream::Impl::binding_id() const {
+  return rig_changes_.empty() ? joined_.binding_id
+                              : rig_changes_.back().binding_id;
+}
+
+absl::Status DeformStream::Impl::Hold(const HeldBinding& weights) {
+  DEFORM_RETURN_IF_ERROR(HeldWeights::Check(weights, joined_));
+  weights_.Add(weights, binding_id());
+  join_.mutable_held()->set_binding_id(weights.binding_id);
+  v1::DeformRequest request;
+  *request.mutable_held() = join_.held();
+  return Tell(std::move(request));
+}
+
 bool DeformStream::Impl::Sleep(std::chrono::milliseconds time) {
   const auto end = std::chrono::steady_clock::now() + time;
   MutexLock lock(mutex_);
@@ -279,6 +297,7 @@ std::optional<absl::Status> DeformStream::Impl::Handle(Frame& frame) {
           FromProto(response_.rig_changed(), joined_.dimension);
       if (!change.ok()) return Refuse(change.status());
       rig_changes_.push_back(*std::move(change));
+      assembler_->BeginBinding(binding_id());
       return std::nullopt;
     }
     case v1::DeformResponse::kPointOrder: {

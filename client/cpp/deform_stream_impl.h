@@ -47,6 +47,7 @@ class DeformStream::Impl {
 
   // The receiving side.
   absl::Status NextFrame(Frame& frame);
+  absl::Status Hold(const HeldBinding& weights);
   const std::vector<RigChange>& rig_changes() const { return rig_changes_; }
   const std::vector<ParticipantInfo>& participants() const {
     return participants_;
@@ -77,6 +78,8 @@ class DeformStream::Impl {
   // The connection ended with `reason`: joins again, or says why not.
   absl::Status Reconnect(absl::Status reason);
   absl::Status TryToReconnect();
+  // Of the session, as far as it was told.
+  const std::string& binding_id() const;
   absl::Status Adopt(std::shared_ptr<DeformLink> link,
                      const v1::Joined& joined);
   // False if it was cancelled meanwhile.
@@ -95,8 +98,9 @@ class DeformStream::Impl {
 
   // The receiving thread's.
   std::shared_ptr<DeformLink> reader_;
-  std::optional<FrameAssembler> assembler_;
-  v1::DeformResponse response_;  // Kept for its buffers.
+  HeldWeights weights_;
+  std::optional<FrameAssembler> assembler_;  // Refers to the weights.
+  v1::DeformResponse response_;              // Kept for its buffers.
   std::optional<uint64_t> last_revision_;
   uint64_t last_epoch_ = 0;  // Of the last frame.
   uint64_t epoch_ = 0;       // Of the session, when it was joined.

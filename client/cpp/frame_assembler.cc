@@ -45,6 +45,11 @@ absl::Status FrameAssembler::AddOrder(const v1::PointOrderChunk& chunk) {
   return absl::OkStatus();
 }
 
+void FrameAssembler::BeginBinding(std::string binding_id) {
+  if (binding_id != binding_id_) held_pose_.reset();
+  binding_id_ = std::move(binding_id);
+}
+
 absl::Status FrameAssembler::Begin(const v1::FrameChunk& chunk, Frame& frame) {
   if (chunk.origin_size() > 0) {
     if (chunk.origin_size() != dimension_) {
@@ -60,7 +65,13 @@ absl::Status FrameAssembler::Begin(const v1::FrameChunk& chunk, Frame& frame) {
   if (encoding_ == nullptr) {
     return BadFrame("encoding \"", chunk.encoding(), "\" is not known");
   }
+  refers_ = encoding_->refers() && !chunk.keyframe();
   if (encoding_->uses_grid()) DEFORM_RETURN_IF_ERROR(BeginOnGrid(chunk));
+  if (encoding_->needs() == Needs::kWeights) {
+    DEFORM_RETURN_IF_ERROR(
+        CheckReference(chunk, held_pose_ ? std::optional(held_pose_->revision)
+                                         : std::nullopt));
+  }
   revision_ = chunk.revision();
   frame.revision = chunk.revision();
   frame.epoch = chunk.epoch();
@@ -83,17 +94,21 @@ absl::Status FrameAssembler::Begin(const v1::FrameChunk& chunk, Frame& frame) {
 
 absl::Status FrameAssembler::BeginOnGrid(const v1::FrameChunk& chunk) {
   if (!order_) return BadFrame("the order of points has not come");
-  predicted_ = !chunk.keyframe();
-  if (predicted_ && (!held_ || held_->revision != chunk.reference_revision())) {
-    return BadFrame("revision ", chunk.revision(), " refers to revision ",
-                    chunk.reference_revision(), ", which is not held");
-  }
+  DEFORM_RETURN_IF_ERROR(CheckReference(
+      chunk, held_ ? std::optional(held_->revision) : std::nullopt));
   if (!CheckTolerance(chunk.step()).ok()) {
     return BadFrame("the grid has step ", chunk.step());
   }
   step_ = chunk.step();
   if (!grid_) grid_.emplace(point_count_);
   return absl::OkStatus();
+}
+
+absl::Status FrameAssembler::CheckReference(
+    const v1::FrameChunk& chunk, std::optional<uint64_t> held) const {
+  if (!refers_ || held == chunk.reference_revision()) return absl::OkStatus();
+  return BadFrame("revision ", chunk.revision(), " refers to revision ",
+                  chunk.reference_revision(), ", which is not held");
 }
 
 absl::Status FrameAssembler::CheckFollows(const v1::FrameChunk& chunk) const {
@@ -115,6 +130,7 @@ absl::StatusOr<bool> FrameAssembler::Add(const v1::FrameChunk& chunk,
     newest_epoch_ = chunk.epoch();
     next_vertex_ = 0;
     held_.reset();
+    held_pose_.reset();
   }
   DEFORM_RETURN_IF_ERROR(next_vertex_ == 0 ? Begin(chunk, frame)
                                            : CheckFollows(chunk));
@@ -147,13 +163,22 @@ absl::Status FrameAssembler::Decode(const v1::FrameChunk& chunk, Frame& frame) {
       .dimension = dimension_, .first = next_vertex_, .count = count};
   if (encoding_->uses_grid()) {
     target.grid = &*grid_;
-    if (predicted_) target.reference = &held_->grid;
-  } else {
-    target.positions =
-        std::span<float>(frame.positions)
-            .subspan(next_vertex_ * dimension_, count * dimension_);
+    if (refers_) target.reference = &held_->grid;
+    return encoding_->Decode(BytesOf(chunk.data()), target);
   }
-  return encoding_->Decode(BytesOf(chunk.data()), target);
+  target.positions =
+      std::span<float>(frame.positions)
+          .subspan(next_vertex_ * dimension_, count * dimension_);
+  if (encoding_->needs() != Needs::kWeights) {
+    return encoding_->Decode(BytesOf(chunk.data()), target);
+  }
+  target.deformer = weights_ != nullptr ? weights_->Find(binding_id_) : nullptr;
+  target.origin = origin_;
+  target.error_bound = &frame.error_bound;
+  if (refers_) target.reference_pose = &held_pose_->pose;
+  DEFORM_RETURN_IF_ERROR(encoding_->Decode(BytesOf(chunk.data()), target));
+  held_pose_ = HeldPose{revision_, target.deformer->pose()};
+  return absl::OkStatus();
 }
 
 absl::Status FrameAssembler::ReadNormals(const v1::FrameChunk& chunk,

@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/cpp/deform_stream.h"
+#include "client/cpp/held_weights.h"
 #include "core/frames/encoding.h"
 #include "core/frames/grid.h"
 #include "core/frames/point_order.h"
@@ -17,13 +18,21 @@
 namespace deform {
 
 // Puts the chunks of one stream together. Holds the integers of two frames at
-// most, 12 bytes a point each, and the order of points, whatever comes. Not
-// thread-safe.
+// most, 12 bytes a point each, the order of points, and a pose, whatever comes.
+// Not thread-safe.
 class FrameAssembler {
  public:
-  // `normals`: frames have them.
-  FrameAssembler(int dimension, int64_t point_count, bool normals = false)
-      : dimension_(dimension), point_count_(point_count), normals_(normals) {}
+  // `normals`: frames have them. Poses are deformed with `weights`, borrowed;
+  // null: there are none.
+  FrameAssembler(int dimension, int64_t point_count, bool normals = false,
+                 const HeldWeights* weights = nullptr)
+      : dimension_(dimension),
+        point_count_(point_count),
+        normals_(normals),
+        weights_(weights) {}
+
+  // The frames that follow are of this binding.
+  void BeginBinding(std::string binding_id);
 
   // Adds a chunk to `frame`, the same for all chunks of a frame. True if it
   // completed it. Chunks come from outside: InvalidArgument (BAD_FRAME) if they
@@ -40,9 +49,15 @@ class FrameAssembler {
     uint64_t revision = 0;
     Grid grid;
   };
+  struct HeldPose {
+    uint64_t revision = 0;
+    Pose pose;
+  };
 
   absl::Status Begin(const v1::FrameChunk& chunk, Frame& frame);
   absl::Status BeginOnGrid(const v1::FrameChunk& chunk);
+  absl::Status CheckReference(const v1::FrameChunk& chunk,
+                              std::optional<uint64_t> held) const;
   absl::Status CheckFollows(const v1::FrameChunk& chunk) const;
   absl::Status Decode(const v1::FrameChunk& chunk, Frame& frame);
   absl::Status ReadNormals(const v1::FrameChunk& chunk, Frame& frame) const;
@@ -51,18 +66,22 @@ class FrameAssembler {
   const int dimension_;
   const int64_t point_count_;
   const bool normals_;
+  const HeldWeights* const weights_;
+  std::string binding_id_;
   uint64_t newest_epoch_ = 0;
   bool have_origin_ = false;
   Vec3 origin_ = Vec3::Zero();
   std::vector<uint8_t> order_bytes_;  // As far as they have come.
   std::optional<PointOrder> order_;
-  std::optional<Held> held_;  // What the next frame on a grid may refer to.
+  // What the next frame on a grid, and the next pose, may refer to.
+  std::optional<Held> held_;
+  std::optional<HeldPose> held_pose_;
 
   // Of the current frame.
   int64_t next_vertex_ = 0;  // Vertices so far.
   uint64_t revision_ = 0;
   const FrameEncoding* encoding_ = nullptr;
-  bool predicted_ = false;  // From what is held.
+  bool refers_ = false;  // To what is held.
   double step_ = 0;
   std::optional<Grid> grid_;  // Kept for its memory.
 };

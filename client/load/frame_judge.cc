@@ -32,18 +32,6 @@ std::vector<Run> RunsOf(int64_t points, int64_t columns) {
 
 }  // namespace
 
-absl::StatusOr<Rig> RigOf(const RigArrays& arrays) {
-  if (arrays.kind == RigKind::kHandles) {
-    DEFORM_ASSIGN_OR_RETURN(
-        Handles handles,
-        Handles::Create(arrays.dimension, arrays.vertices, arrays.fixed));
-    return Rig(std::move(handles));
-  }
-  DEFORM_ASSIGN_OR_RETURN(
-      Cage cage, Cage::Create(arrays.dimension, arrays.vertices, arrays.faces));
-  return Rig(std::move(cage));
-}
-
 absl::StatusOr<FrameJudge> FrameJudge::FromModel(const ModelArrays& model,
                                                  const BindingSpec& spec,
                                                  double tolerance) {

@@ -11,9 +11,6 @@
 
 namespace deform {
 
-// The rig of such arrays; the errors of Cage::Create() and Handles::Create().
-absl::StatusOr<Rig> RigOf(const RigArrays& arrays);
-
 // Deforms in double precision, with weights in double precision, and compares.
 // Of a model with more than kMaxWeights weights, runs of points all over it are
 // compared instead of all. Immutable.

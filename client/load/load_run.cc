@@ -131,12 +131,15 @@ class Run {
 
   absl::Status Join() {
     size_t next = 0;
-    DeformOptions viewing = options_.frames;
-    viewing.max_fps = options_.viewer_fps;
+    int64_t number = 0;
     for (const auto& session : sessions_) {
+      DeformOptions editing = options_.frames;
+      editing.weights = TargetOf(number++).weights;
+      DeformOptions viewing = editing;
+      viewing.max_fps = options_.viewer_fps;
       for (int p = 0; p < session->participants(); ++p) {
         session->Start(clients_[next++ % clients_.size()], p,
-                       p < options_.editors ? options_.frames : viewing);
+                       p < options_.editors ? editing : viewing);
       }
     }
     const auto deadline = Clock::now() + kJoinPatience;

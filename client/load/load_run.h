@@ -47,6 +47,7 @@ struct LoadTarget {
   int64_t point_count = 0;
   std::shared_ptr<const PosePattern> pattern;
   std::shared_ptr<const FrameJudge> judge;  // Null: frames are not checked.
+  HeldBinding weights = {};  // That participants hold; may be none.
 };
 
 // A part of the run as it goes on.

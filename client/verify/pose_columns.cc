@@ -3,23 +3,9 @@
 #include "core/base/status_macros.h"
 
 namespace deform {
-namespace {
-
-absl::StatusOr<Rig> MakeRig(const RigArrays& arrays) {
-  if (arrays.kind == RigKind::kHandles) {
-    DEFORM_ASSIGN_OR_RETURN(Handles handles,
-                            Handles::Create(arrays.dimension, arrays.vertices));
-    return Rig(std::move(handles));
-  }
-  DEFORM_ASSIGN_OR_RETURN(
-      Cage cage, Cage::Create(arrays.dimension, arrays.vertices, arrays.faces));
-  return Rig(std::move(cage));
-}
-
-}  // namespace
 
 absl::StatusOr<CaseColumns> CaseColumns::Create(const GoldenCase& golden) {
-  DEFORM_ASSIGN_OR_RETURN(const Rig rig, MakeRig(golden.rig));
+  DEFORM_ASSIGN_OR_RETURN(const Rig rig, RigOf(golden.rig));
   const PosedColumns posed(rig, golden.uses_normals());
   CaseColumns result;
   result.vertex_count_ = posed.vertex_count();

@@ -6,7 +6,8 @@
 #define DEFORM_ENCODINGS(X) \
   X(Float32)                \
   X(Quantized16)            \
-  X(Predicted)
+  X(Predicted)              \
+  X(Pose)
 
 namespace deform {
 

@@ -9,12 +9,15 @@
 // shared by all receivers that agree on (revision, encoding, tolerance,
 // reference).
 //
-// Encodings are of two kinds. Those of positions are stateless: a chunk holds
+// Encodings are of three kinds. Those of positions are stateless: a chunk holds
 // vertices in the order of the model. Those on a grid (uses_grid()) write
-// integers (grid.h) in an order of their own (point_order.h), losslessly, and
-// may predict them from a reference: the grid of one other revision that the
-// receiver holds. A frame without a reference is a keyframe. As the integers
-// arrive as they were, errors never accumulate.
+// integers (grid.h) in an order of their own (point_order.h), losslessly. Those
+// that need something (needs()) write, in one chunk, what the vertices are made
+// of; the receiver makes them from what it holds.
+//
+// A frame may tell what differs from a reference (refers()): another revision
+// that the receiver has, as a grid or a pose. Without one it is a keyframe. As
+// these arrive as they were, errors never accumulate.
 //
 // The tolerance is one: no decoded point is farther than it, in model units,
 // from the point that was given, roundings to float on both sides included.
@@ -28,8 +31,12 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "core/frames/grid.h"
+#include "core/mesh/types.h"
 
 namespace deform {
+
+class Deformer;
+struct Pose;
 
 // Chunks of a frame hold at most this many bytes.
 inline constexpr int64_t kMaxChunkBytes = int64_t{1} << 20;
@@ -48,6 +55,10 @@ struct ChunkSource {
   // its reference, of as many points; null in a keyframe.
   const Grid* grid = nullptr;
   const Grid* reference = nullptr;
+  // For encodings that need something: what the frame shows, and the pose that
+  // is its reference, of the same rig; null in a keyframe.
+  const Deformer* deformer = nullptr;
+  const Pose* reference_pose = nullptr;
 };
 
 // Where a chunk is decoded to. As above; grids of another size than the frame's
@@ -59,6 +70,19 @@ struct ChunkTarget {
   std::span<float> positions;
   Grid* grid = nullptr;
   const Grid* reference = nullptr;
+  // With the weights of the receiver; null if it holds none. It is moved to the
+  // pose of the frame; positions are then relative to `origin`, and
+  // `error_bound` (may be null) is what DeformReport says.
+  Deformer* deformer = nullptr;
+  const Pose* reference_pose = nullptr;
+  Vec3 origin = Vec3::Zero();
+  double* error_bound = nullptr;
+};
+
+// What a receiver has to hold, beside earlier frames.
+enum class Needs {
+  kNothing,
+  kWeights,  // Of the binding.
 };
 
 class FrameEncoding {
@@ -71,18 +95,23 @@ class FrameEncoding {
   // Gives back the very floats it was given: needs no tolerance.
   virtual bool is_exact() const { return false; }
   virtual bool uses_grid() const { return false; }
+  virtual Needs needs() const { return Needs::kNothing; }
+  // A frame may have a reference.
+  virtual bool refers() const { return uses_grid(); }
   // The least tolerance that can be kept for points whose coordinates reach
   // this far from the origin; 0 if it is exact.
   virtual double FinestTolerance(double reach) const = 0;
 
   // Points that a chunk holds at most: then it never exceeds kMaxChunkBytes. On
-  // a grid a multiple of kGridBlock, as is the beginning of every chunk.
+  // a grid a multiple of kGridBlock, as is the beginning of every chunk. More
+  // than there are, if one chunk holds the frame.
   virtual int64_t PointsPerChunk(int dimension) const = 0;
 
   // Writes a chunk to `out`, which holds kMaxChunkBytes. Returns the bytes
   // written, or
   //   FailedPrecondition TOLERANCE_NOT_MET  says what can be met; the caller
   //     picks another encoding
+  //   FailedPrecondition FRAME_TOO_LARGE  for one chunk; likewise
   //   InvalidArgument NON_FINITE
   virtual absl::StatusOr<int64_t> Encode(const ChunkSource& source,
                                          uint8_t* out) const = 0;

@@ -38,8 +38,11 @@ bool RoundToGrid(const float* HWY_RESTRICT x, double per_step, double limit,
   for (int64_t i = 0; i < kGridBlock; i += kHalfLanes) {
     const auto steps =
         hn::Mul(hn::PromoteTo(kDoubles, hn::LoadU(kHalfFloats, x + i)), scale);
-    within = hn::And(within, hn::Le(hn::Abs(steps), most));
-    hn::StoreU(hn::DemoteTo(kHalfInts, hn::Round(steps)), kHalfInts, grid + i);
+    const auto fits = hn::Le(hn::Abs(steps), most);
+    within = hn::And(within, fits);
+    // What is no number is none that can be converted.
+    const auto rounded = hn::Round(hn::IfThenElseZero(fits, steps));
+    hn::StoreU(hn::DemoteTo(kHalfInts, rounded), kHalfInts, grid + i);
   }
   return hn::AllTrue(kDoubles, within);
 }

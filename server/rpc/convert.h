@@ -62,6 +62,7 @@ struct JoinRequest {
 };
 // BAD_NAME, UNKNOWN_VALUE (delivery), UNKNOWN_ENCODING.
 absl::StatusOr<JoinRequest> FromProto(const v1::Join& join);
+absl::StatusOr<WeightsId> FromProto(const v1::HeldWeights& held);
 
 // As far as its shape goes: BAD_TOKEN (longer than 64 bytes), UNKNOWN_VALUE
 // (role).

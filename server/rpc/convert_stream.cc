@@ -30,6 +30,7 @@ absl::Status ReadWishes(const v1::Join& join, FrameWishes& wishes) {
   wishes.cheapest = join.cheapest_encoding();
   wishes.max_fps = join.max_fps();
   wishes.normals = join.normals();
+  DEFORM_ASSIGN_OR_RETURN(wishes.weights, FromProto(join.held()));
   if (join.has_tolerance()) wishes.tolerance = join.tolerance();
   if (join.has_tolerance_fraction()) {
     wishes.tolerance_fraction = join.tolerance_fraction();
@@ -38,6 +39,13 @@ absl::Status ReadWishes(const v1::Join& join, FrameWishes& wishes) {
 }
 
 }  // namespace
+
+absl::StatusOr<WeightsId> FromProto(const v1::HeldWeights& held) {
+  if (!held.binding_id().empty()) {
+    DEFORM_RETURN_IF_ERROR(CheckName(held.binding_id(), "held.binding_id"));
+  }
+  return WeightsId{.binding = held.binding_id()};
+}
 
 absl::StatusOr<JoinRequest> FromProto(const v1::Join& join) {
   JoinRequest request;

@@ -144,6 +144,10 @@ bool DeformReactor::HandleRequest(Participant& participant,
     case v1::DeformRequest::kKeyframe:
       participant.WantKeyframe();
       return true;
+    case v1::DeformRequest::kHeld:
+      // Who names no weights that can be holds none.
+      participant.Hold(FromProto(request.held()).value_or(WeightsId()));
+      return true;
     case v1::DeformRequest::kLock:
       participant.Lock(request.lock().sequence(),
                        ToHandles(request.lock().vertices(), "lock.vertices"),

@@ -54,7 +54,7 @@ v1::FrameChunk ChunkHeader(const FrameToSend& send, size_t index,
   header.set_columns_applied(Clamped(frame.info.columns_applied));
   header.set_exit_mismatch(frame.info.exit_mismatch);
   header.set_deform_us(Clamped(frame.info.deform_time.count()));
-  if (frame.grid != nullptr) header.set_step(frame.grid->step);
+  if (frame.encoding->uses_grid()) header.set_step(frame.held->step);
   header.set_error_bound(frame.error_bound);
   return header;
 }

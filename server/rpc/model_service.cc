@@ -5,6 +5,7 @@
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
 #include "server/rpc/convert.h"
+#include "server/rpc/model_chunks.h"
 
 namespace deform::server {
 namespace {
@@ -72,6 +73,30 @@ grpc::Status ModelService::GetModel(grpc::ServerContext* context,
         const auto record,
         models_.catalogue().Find(tenant, request->model_id()));
     ToProto(*record, response->mutable_model());
+    return absl::OkStatus();
+  });
+}
+
+grpc::Status ModelService::DownloadModel(
+    grpc::ServerContext* context, const v1::DownloadModelRequest* request,
+    grpc::ServerWriter<v1::DownloadModelResponse>* writer) {
+  return calls_.Run("DownloadModel", *context, [&]() -> absl::Status {
+    PeerWriter<v1::DownloadModelResponse> peer(calls_, *context, *writer);
+    DEFORM_ASSIGN_OR_RETURN(const std::string tenant,
+                            TenantOr(request->tenant()));
+    DEFORM_ASSIGN_OR_RETURN(
+        const auto record,
+        models_.catalogue().Find(tenant, request->model_id()));
+    v1::DownloadModelResponse message;
+    ToProto(*record, message.mutable_model());
+    if (!peer.Write(message)) return absl::CancelledError();
+    const Mesh& mesh = *record->mesh;
+    const int64_t bytes = BytesOfArrays(mesh);
+    for (int64_t offset = 0; offset < bytes;) {
+      *message.mutable_chunk() = ChunkOfArrays(mesh, offset);
+      if (!peer.Write(message)) return absl::CancelledError();
+      offset += std::ssize(message.chunk().data());
+    }
     return absl::OkStatus();
   });
 }

@@ -20,6 +20,9 @@ class ModelService final : public v1::ModelService::Service {
   grpc::Status GetModel(grpc::ServerContext* context,
                         const v1::GetModelRequest* request,
                         v1::GetModelResponse* response) override;
+  grpc::Status DownloadModel(
+      grpc::ServerContext* context, const v1::DownloadModelRequest* request,
+      grpc::ServerWriter<v1::DownloadModelResponse>* writer) override;
   grpc::Status ListModels(grpc::ServerContext* context,
                           const v1::ListModelsRequest* request,
                           v1::ListModelsResponse* response) override;

@@ -8,18 +8,28 @@ namespace deform::server {
 
 bool Audience::Seat::HasRoom() const {
   if (outbox.delivery() == Delivery::kEvery) return !outbox.full();
-  if (!format.encoding->uses_grid() && interval.count() == 0) return true;
+  if (!format.encoding->refers() && interval.count() == 0) return true;
   return !waiting_since && !outbox.has_frames();
+}
+
+FrameKey Audience::Seat::key() const {
+  const FrameEncoding& encoding = *format.encoding;
+  const bool fits = encoding.refers() && held != nullptr &&
+                    (held->grid() != nullptr) == encoding.uses_grid();
+  return {format, fits ? held : nullptr};
 }
 
 int64_t Audience::Add(const Subscription& wanted,
                       std::weak_ptr<Receiver> receiver, TimePoint now,
                       const Rejoining& from) {
   Seat seat{.outbox = Outbox(wanted.delivery),
-            .format = wanted.format,
+            .wanted = wanted.format,
+            .otherwise = wanted.otherwise,
+            .weights = wanted.weights,
             .normals = wanted.normals,
             .interval = wanted.interval,
             .receiver = std::move(receiver)};
+  seat.PickFormat(weights_);
   seat.contained = from.contained;
   seat.outbox.Expect(from.last_pose);
   if (from.revision) seat.outbox.GoOnFrom(*from.revision);
@@ -41,6 +51,23 @@ void Audience::WantKeyframe(int64_t seat) {
   if (found == seats_.end()) return;
   found->second.held.reset();
   found->second.needs_frame = true;
+}
+
+void Audience::Hold(int64_t seat, WeightsId weights) {
+  const auto found = seats_.find(seat);
+  if (found == seats_.end()) return;
+  Seat& holding = found->second;
+  holding.weights = std::move(weights);
+  // Poses that it has may be of another rig.
+  if (holding.held != nullptr && holding.held->pose() != nullptr) {
+    holding.held.reset();
+  }
+  holding.PickFormat(weights_);
+}
+
+void Audience::SetWeights(WeightsId weights) {
+  weights_ = std::move(weights);
+  for (auto& [number, seat] : seats_) seat.PickFormat(weights_);
 }
 
 bool Audience::HasRoom() const {
@@ -142,7 +169,7 @@ bool Audience::Serve(Seat& seat, TimePoint now) {
   if (seat.normals && normals_ == nullptr) return false;
   const std::shared_ptr<const Frame>& frame = found->second;
   seat.outbox.Offer(frame, seat.contained, seat.normals ? normals_ : nullptr);
-  if (frame->grid != nullptr) seat.held = frame->grid;
+  if (frame->held != nullptr) seat.held = frame->held;
   seat.needs_frame = false;
   seat.offered_any = true;
   return true;

@@ -39,12 +39,15 @@ struct Rejoining {
   std::vector<Notice> notices;  // Again: they may be lost.
 };
 
-// A receiver holds one revision on a grid: the last that it was offered, since
-// streams lose nothing. So a frame that refers to another may not be replaced
-// in the outbox: with delivery LATEST such a seat is offered one only when
-// nothing is under way to it, and is served late otherwise. So is one that
-// wants few frames, and only when its interval is over. Others are always
-// offered the newest, in which they share.
+// A receiver holds one revision that frames may refer to: the last such that it
+// was offered, since streams lose nothing. So a frame that refers to another
+// may not be replaced in the outbox: with delivery LATEST such a seat is
+// offered one only when nothing is under way to it, and is served late
+// otherwise. So is one that wants few frames, and only when its interval is
+// over. Others are always offered the newest, in which they share.
+//
+// Who is to have frames that need weights has them as long as it holds those of
+// the present revision, and others else.
 //
 // Not thread-safe. A seat that is not there (any more) takes nothing in.
 class Audience {
@@ -64,6 +67,10 @@ class Audience {
   Outbox* Find(int64_t seat);
   // The seat has lost what it held: it needs a frame that refers to no other.
   void WantKeyframe(int64_t seat);
+  // The weights that its receiver has from now on.
+  void Hold(int64_t seat, WeightsId weights);
+  // Those of the revision that is published next, and of those after it.
+  void SetWeights(WeightsId weights);
 
   // Everybody has room for the frame of a next revision.
   bool HasRoom() const;
@@ -113,18 +120,24 @@ class Audience {
  private:
   struct Seat {
     Outbox outbox;
-    FrameFormat format;
+    FrameFormat wanted;
+    FrameFormat otherwise;
+    WeightsId weights;   // That the receiver has.
+    FrameFormat format;  // One of the two: that of the next frame.
     bool normals = false;
     std::chrono::nanoseconds interval{0};
     std::weak_ptr<Receiver> receiver;
     uint64_t contained = 0;  // Newest pose that the revision contains.
     bool needs_frame = true;
     bool offered_any = false;
-    std::shared_ptr<const RevisionGrid> held;
+    std::shared_ptr<const HeldRevision> held;
     std::optional<TimePoint> waiting_since;
     TimePoint due = TimePoint::min();  // No frame before, unless in a hurry.
 
-    FrameKey key() const { return {format, held}; }
+    FrameKey key() const;
+    void PickFormat(const WeightsId& present) {
+      format = weights.Serves(*wanted.encoding, present) ? wanted : otherwise;
+    }
     bool HasRoom() const;
     bool CanBeServed(TimePoint now) const {
       return HasRoom() && (now >= due || outbox.in_a_hurry());
@@ -140,6 +153,7 @@ class Audience {
 
   std::map<int64_t, Seat> seats_;
   int64_t next_seat_ = 1;
+  WeightsId weights_;
   uint64_t revision_ = 0;
   Frames frames_;                                // Of the revision.
   std::shared_ptr<const FrameNormals> normals_;  // Likewise, if wanted.

@@ -7,8 +7,11 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
+#include <variant>
 #include <vector>
 
+#include "core/deform/pose.h"
 #include "core/frames/encoding.h"
 #include "core/frames/grid.h"
 #include "core/frames/point_order.h"
@@ -29,7 +32,7 @@ struct FrameInfo {
   std::chrono::microseconds deform_time{0};
 };
 
-// How a receiver has its frames: settled when it joins (frame_wishes.h).
+// How a receiver has its frames.
 struct FrameFormat {
   const FrameEncoding* encoding = nullptr;
   double tolerance = 0;  // In model units; 0 if the encoding is exact.
@@ -37,19 +40,41 @@ struct FrameFormat {
   auto operator<=>(const FrameFormat&) const = default;
 };
 
-// A revision on a grid, as those hold it who received it. Immutable; travels as
-// shared_ptr<const RevisionGrid>.
-struct RevisionGrid {
+// A revision as those have it who received it on a grid, or as a pose: what a
+// later frame may refer to. Immutable; travels as shared_ptr<const
+// HeldRevision>.
+struct HeldRevision {
   uint64_t revision = 0;
-  double step = 0;
-  Grid grid;
+  double step = 0;  // Of the grid.
+  std::variant<Grid, Pose> content;
+
+  // Null if it is the other.
+  const Grid* grid() const { return std::get_if<Grid>(&content); }
+  const Pose* pose() const { return std::get_if<Pose>(&content); }
+};
+
+// Which weights there are.
+struct WeightsId {
+  std::string binding;  // Empty: none.
+
+  // Who holds these can read frames of this encoding of a session that has
+  // `present`.
+  bool Serves(const FrameEncoding& encoding, const WeightsId& present) const {
+    switch (encoding.needs()) {
+      case Needs::kNothing:
+        return true;
+      case Needs::kWeights:
+        return !binding.empty() && binding == present.binding;
+    }
+    return false;
+  }
 };
 
 // Frames of a revision with the same key are the same bytes.
 struct FrameKey {
   FrameFormat format;
   // What the receiver holds; null: a keyframe.
-  std::shared_ptr<const RevisionGrid> reference;
+  std::shared_ptr<const HeldRevision> reference;
 
   auto operator<=>(const FrameKey&) const = default;
 };
@@ -77,9 +102,9 @@ struct Frame {
   double error_bound = 0;
   std::vector<Chunk> chunks;  // In order; at least one.
 
-  // On a grid: what its receiver holds then, and in which order.
-  std::shared_ptr<const RevisionGrid> grid;
-  std::shared_ptr<const PointOrder> order;
+  // What its receiver holds then, if a frame may refer to it.
+  std::shared_ptr<const HeldRevision> held;
+  std::shared_ptr<const PointOrder> order;  // Of one on a grid.
   // None: a keyframe, which refers to no other.
   std::optional<uint64_t> reference_revision;
 };

@@ -24,22 +24,23 @@ Scratch& ThreadScratch() {
   return scratch;
 }
 
-// `source` but for the positions, which encodings without a grid want: of those
-// of all points, unless these are empty.
-absl::StatusOr<Frame::Chunk> EncodeChunk(const Deformer& deformer,
-                                         const FrameEncoding& encoding,
+// `source` but for the positions, if the encoding is one of these: of those of
+// all points, unless these are empty.
+absl::StatusOr<Frame::Chunk> EncodeChunk(const FrameEncoding& encoding,
                                          const Vec3& origin,
                                          std::span<const float> positions,
                                          ChunkSource source) {
   Scratch& scratch = ThreadScratch();
   scratch.bytes.resize(kMaxChunkBytes);
-  if (source.grid == nullptr && !positions.empty()) {
+  const bool of_positions =
+      !encoding.uses_grid() && encoding.needs() == Needs::kNothing;
+  if (of_positions && !positions.empty()) {
     source.positions = positions.subspan(source.first * source.dimension,
                                          source.count * source.dimension);
-  } else if (source.grid == nullptr) {
+  } else if (of_positions) {
     scratch.positions.resize(source.count * source.dimension);
-    deformer.CopyRelative(source.first, source.count, origin,
-                          scratch.positions.data());
+    source.deformer->CopyRelative(source.first, source.count, origin,
+                                  scratch.positions.data());
     source.positions = scratch.positions;
   }
   DEFORM_ASSIGN_OR_RETURN(const int64_t size,
@@ -79,6 +80,7 @@ void FrameMaker::Begin(const FrameInfo& info) {
   revision_ = info.revision;
   positions_.clear();
   grids_.clear();
+  pose_.reset();
   normals_.reset();
 }
 
@@ -123,7 +125,16 @@ std::shared_ptr<const FrameNormals> FrameMaker::Normals(
   return normals_;
 }
 
-absl::StatusOr<std::shared_ptr<const RevisionGrid>> FrameMaker::GridOf(
+std::shared_ptr<const HeldRevision> FrameMaker::PoseOf(const Deformer& deformer,
+                                                       const FrameInfo& info) {
+  if (pose_ == nullptr) {
+    pose_ = std::make_shared<const HeldRevision>(
+        HeldRevision{.revision = info.revision, .content = deformer.pose()});
+  }
+  return pose_;
+}
+
+absl::StatusOr<std::shared_ptr<const HeldRevision>> FrameMaker::GridOf(
     const Deformer& deformer, const FrameInfo& info, double step) {
   const auto made = grids_.find(step);
   if (made != grids_.end()) return made->second;
@@ -139,8 +150,8 @@ absl::StatusOr<std::shared_ptr<const RevisionGrid>> FrameMaker::GridOf(
   }
   DEFORM_ASSIGN_OR_RETURN(Grid grid,
                           PutOnGrid(positions, dimension, step, *order_));
-  auto held = std::make_shared<const RevisionGrid>(RevisionGrid{
-      .revision = info.revision, .step = step, .grid = std::move(grid)});
+  auto held = std::make_shared<const HeldRevision>(HeldRevision{
+      .revision = info.revision, .step = step, .content = std::move(grid)});
   grids_[step] = held;
   return held;
 }
@@ -156,9 +167,18 @@ absl::StatusOr<std::shared_ptr<const Frame>> FrameMaker::Encode(
   frame->encoding = &encoding;
   frame->error_bound = info.weight_error + share;
   if (encoding.uses_grid()) {
-    DEFORM_ASSIGN_OR_RETURN(frame->grid, GridOf(deformer, info, share));
+    DEFORM_ASSIGN_OR_RETURN(frame->held, GridOf(deformer, info, share));
     frame->order = order_;
-    if (key.reference) frame->reference_revision = key.reference->revision;
+  } else if (encoding.refers()) {
+    frame->held = PoseOf(deformer, info);
+  }
+  if (key.reference) frame->reference_revision = key.reference->revision;
+  ChunkSource source{
+      .dimension = frame->dimension, .tolerance = share, .deformer = &deformer};
+  if (frame->held) source.grid = frame->held->grid();
+  if (key.reference) {
+    source.reference = key.reference->grid();
+    source.reference_pose = key.reference->pose();
   }
   const int64_t points = deformer.binding().point_count();
   const int64_t per_chunk = encoding.PointsPerChunk(frame->dimension);
@@ -166,17 +186,12 @@ absl::StatusOr<std::shared_ptr<const Frame>> FrameMaker::Encode(
   frame->chunks.resize(chunks);
   DEFORM_RETURN_IF_ERROR(
       ForEachChunk(chunks, pool, [&](int64_t i) -> absl::Status {
-        const int64_t first = i * per_chunk;
+        ChunkSource part = source;
+        part.first = i * per_chunk;
+        part.count = std::min(per_chunk, points - part.first);
         DEFORM_ASSIGN_OR_RETURN(
             frame->chunks[i],
-            EncodeChunk(
-                deformer, encoding, info.origin, positions_,
-                {.dimension = frame->dimension,
-                 .first = first,
-                 .count = std::min(per_chunk, points - first),
-                 .tolerance = share,
-                 .grid = frame->grid ? &frame->grid->grid : nullptr,
-                 .reference = key.reference ? &key.reference->grid : nullptr}));
+            EncodeChunk(encoding, info.origin, positions_, part));
         return absl::OkStatus();
       }));
   return frame;

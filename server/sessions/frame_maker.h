@@ -44,12 +44,14 @@ class FrameMaker {
   static double ShareOf(double tolerance, double weight_error);
 
  private:
-  using Grids = std::map<double, std::shared_ptr<const RevisionGrid>>;
+  using Grids = std::map<double, std::shared_ptr<const HeldRevision>>;
 
   // What is kept is of this revision.
   void Begin(const FrameInfo& info);
-  absl::StatusOr<std::shared_ptr<const RevisionGrid>> GridOf(
+  absl::StatusOr<std::shared_ptr<const HeldRevision>> GridOf(
       const Deformer& deformer, const FrameInfo& info, double step);
+  std::shared_ptr<const HeldRevision> PoseOf(const Deformer& deformer,
+                                             const FrameInfo& info);
   absl::StatusOr<std::shared_ptr<const Frame>> Encode(const Deformer& deformer,
                                                       const FrameInfo& info,
                                                       const FrameKey& key,
@@ -63,6 +65,7 @@ class FrameMaker {
   // wanted (encodings then take them from here, too), and what was made.
   std::vector<float> positions_;
   Grids grids_;  // By step.
+  std::shared_ptr<const HeldRevision> pose_;
   std::shared_ptr<const FrameNormals> normals_;
 };
 

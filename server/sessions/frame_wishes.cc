@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <span>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -62,13 +64,8 @@ absl::Status CheckHasNormals(const Mesh& model) {
                    {.reason = "NO_NORMALS", .field = "normals"});
 }
 
-}  // namespace
-
-absl::StatusOr<FrameFormat> PickFormat(const FrameWishes& wishes,
-                                       const Rig& rig) {
-  const double diagonal = DiagonalOf(rig);
-  DEFORM_ASSIGN_OR_RETURN(const std::optional<double> tolerance,
-                          ToleranceOf(wishes, diagonal));
+// The best first.
+std::vector<const FrameEncoding*> CandidatesOf(const FrameWishes& wishes) {
   std::vector<const FrameEncoding*> candidates = wishes.encodings;
   if (candidates.empty()) candidates.push_back(FindEncoding("float32"));
   if (wishes.cheapest) {
@@ -79,6 +76,12 @@ absl::StatusOr<FrameFormat> PickFormat(const FrameWishes& wishes,
                        std::find(all.begin(), all.end(), b);
               });
   }
+  return candidates;
+}
+
+absl::StatusOr<FrameFormat> PickFormat(
+    std::span<const FrameEncoding* const> candidates,
+    std::optional<double> tolerance, const Rig& rig) {
   const Box box = BoxOf(RestVertices(rig));
   const double reach = 0.5 * (box.max - box.min).maxCoeff();
   std::string best;
@@ -101,19 +104,45 @@ absl::StatusOr<FrameFormat> PickFormat(const FrameWishes& wishes,
   return InvalidInput(
       "TOLERANCE_NOT_MET", "encodings",
       absl::StrCat("none of the encodings keeps a tolerance of ", *tolerance,
-                   " for a rig of diagonal ", diagonal, ": ", best,
+                   " for a rig of diagonal ", DiagonalOf(rig), ": ", best,
                    "; float32 is exact"));
+}
+
+}  // namespace
+
+absl::StatusOr<FrameFormats> PickFormats(const FrameWishes& wishes,
+                                         const Rig& rig) {
+  const double diagonal = DiagonalOf(rig);
+  DEFORM_ASSIGN_OR_RETURN(const std::optional<double> tolerance,
+                          ToleranceOf(wishes, diagonal));
+  const auto candidates = CandidatesOf(wishes);
+  DEFORM_ASSIGN_OR_RETURN(const FrameFormat format,
+                          PickFormat(candidates, tolerance, rig));
+  if (format.encoding->needs() == Needs::kNothing) {
+    return FrameFormats{format, format};
+  }
+  std::vector<const FrameEncoding*> others;
+  for (const FrameEncoding* const encoding : candidates) {
+    if (encoding->needs() == Needs::kNothing) others.push_back(encoding);
+  }
+  // Everybody takes it.
+  if (others.empty()) others.push_back(FindEncoding("float32"));
+  DEFORM_ASSIGN_OR_RETURN(const FrameFormat otherwise,
+                          PickFormat(others, tolerance, rig));
+  return FrameFormats{format, otherwise};
 }
 
 absl::StatusOr<Subscription> Subscribe(Delivery delivery,
                                        const FrameWishes& wishes,
                                        const Rig& rig, const Mesh& model) {
-  DEFORM_ASSIGN_OR_RETURN(const FrameFormat format, PickFormat(wishes, rig));
+  DEFORM_ASSIGN_OR_RETURN(const FrameFormats formats, PickFormats(wishes, rig));
   if (wishes.normals) DEFORM_RETURN_IF_ERROR(CheckHasNormals(model));
   DEFORM_ASSIGN_OR_RETURN(const auto interval,
                           IntervalOf(delivery, wishes.max_fps));
   return Subscription{.delivery = delivery,
-                      .format = format,
+                      .format = formats.format,
+                      .otherwise = formats.otherwise,
+                      .weights = wishes.weights,
                       .normals = wishes.normals,
                       .interval = interval};
 }

@@ -26,25 +26,34 @@ struct FrameWishes {
   // Frames a second, at most; 0: as they come.
   double max_fps = 0;
   bool normals = false;
+  WeightsId weights;  // That it has.
 };
 
 // What it gets.
 struct Subscription {
   Delivery delivery = Delivery::kLatest;
   FrameFormat format;
+  // While it does not have the weights that frames of `format` need.
+  FrameFormat otherwise;
+  WeightsId weights;
   bool normals = false;
   // Between two frames, at least; only with kLatest.
   std::chrono::nanoseconds interval{0};
 };
 
+struct FrameFormats {
+  FrameFormat format;
+  FrameFormat otherwise;  // Needs no weights.
+};
+
 // The first or cheapest encoding that keeps the tolerance for the model at
-// rest. InvalidArgument:
+// rest, and that of those which need no weights. InvalidArgument:
 //   CONTRADICTION           both tolerances
 //   TOLERANCE_MISSING       encodings that need one, without
 //   TOLERANCE_OUT_OF_RANGE  see CheckTolerance()
 //   TOLERANCE_NOT_MET       by none of the encodings: says what they keep
-absl::StatusOr<FrameFormat> PickFormat(const FrameWishes& wishes,
-                                       const Rig& rig);
+absl::StatusOr<FrameFormats> PickFormats(const FrameWishes& wishes,
+                                         const Rig& rig);
 
 // And InvalidArgument:
 //   MAX_FPS_OUT_OF_RANGE

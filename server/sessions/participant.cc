@@ -147,6 +147,11 @@ void Participant::WantKeyframe() {
   session_->Schedule();
 }
 
+void Participant::Hold(WeightsId weights) {
+  MutexLock lock(session_->mutex_);
+  session_->audience_.Hold(seat_, std::move(weights));
+}
+
 void Participant::HalfClose() {
   MutexLock lock(session_->mutex_);
   Outbox* const outbox = session_->audience_.Find(seat_);

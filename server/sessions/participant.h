@@ -59,6 +59,8 @@ class Participant {
   bool WantsPoses() const;
   // What it held is lost: the next frame is to refer to no other.
   void WantKeyframe();
+  // It has these weights from now on.
+  void Hold(WeightsId weights);
   // No more poses come; the stream ends OK once those that came are answered.
   void HalfClose();
 

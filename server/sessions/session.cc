@@ -63,6 +63,8 @@ Session::Session(StoredStart start, BindingInUse use,
   info_.revision = revision_;
   info_.origin = BoxOf(pose_.vertices).center();
   info_.origin_number = 1;
+  MutexLock lock(mutex_);
+  audience_.SetWeights({.binding = binding_id_});
 }
 
 int64_t Session::BytesFor(const BindingFacts& binding) {
@@ -193,6 +195,12 @@ Session::Step Session::BeginStep() {
   }
   const bool by_all = step.move || step.pose;
   step.wanted = audience_.Wanted(by_all, now);
+  // Nobody has the weights yet that the session moves to.
+  if (step.move) {
+    std::erase_if(step.wanted, [](const FrameKey& key) {
+      return key.format.encoding->needs() != Needs::kNothing;
+    });
+  }
   step.wants_normals = audience_.WantsNormals(by_all, now);
   return step;
 }
@@ -318,6 +326,7 @@ void Session::PublishChange(Step& step) {
   rig_history_.Add(step.change);
   roster_.Transfer(step.change->transfer, environment_.clock());
   audience_.Announce(step.change);
+  audience_.SetWeights({.binding = binding_id_});
 }
 
 }  // namespace deform::server

@@ -297,6 +297,27 @@ TEST_F(Cli, WeightsAreDumpedAsTextAndBytes) {
             kBadFile);
 }
 
+TEST_F(Cli, AModelComesBackAsAFile) {
+  const std::string binding = Bind();
+  const std::string model = RunJson({"show", binding})["model_id"];
+  const CliResult written = Run({"download", model, "--out", Path("back.obj")});
+  EXPECT_EQ(written.exit_code, kOk) << written.err;
+  EXPECT_THAT(written.out, HasSubstr("162 points, 320 triangles\nwrote"));
+  // The same content is the same model.
+  EXPECT_EQ(RunJson({"register", Path("back.obj")})["model_id"], model);
+  EXPECT_EQ(Run({"download", "nowhere", "--out", Path("none.obj")}).exit_code,
+            kRefused);
+  EXPECT_EQ(Run({"download", model, "--out", "/nonexistent/m"}).exit_code,
+            kBadFile);
+}
+
+TEST_F(Cli, PlaysWithWeightsOfItsOwn) {
+  const Json played = RunJson({"play", "--binding", Bind(), "--motion", "bend",
+                               "--frames", "20", "--encoding", "pose"});
+  EXPECT_EQ(played["encodings"].size(), 1u);
+  EXPECT_EQ(played["encodings"]["pose"], 20);
+}
+
 TEST_F(Cli, TenantsDoNotSeeEachOther) {
   Register();
   EXPECT_THAT(RunJson({"--tenant", "other", "list", "models"})["models"],

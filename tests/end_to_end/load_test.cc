@@ -153,7 +153,8 @@ INSTANTIATE_TEST_SUITE_P(
           {"--editors", "4", "--pattern", "jitter", "--delivery", "every"}},
          {"EditorsAndViewers",
           {"--editors", "2", "--viewers", "3", "--pattern", "whole"}},
-         {"Encoding", {"--encoding", "float32"}}}),
+         {"Encoding", {"--encoding", "float32"}},
+         {"Poses", {"--encoding", "pose", "--models", "2"}}}),
     [](const auto& test) { return test.param.name; });
 
 TEST_F(Load, PosesABindingThatIsThereAndLeavesIt) {

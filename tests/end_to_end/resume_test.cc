@@ -42,11 +42,13 @@ Frame FrameWith(DeformStream& stream, uint64_t sequence) {
 // after a number of bytes in one direction that nobody would choose.
 class CutDrag {
  public:
-  CutDrag(const server::Options& options, Delivery delivery)
+  CutDrag(const server::Options& options, Delivery delivery,
+          bool holds_weights = false)
       : server_(options),
         session_(server_.BallSession()),
         client_(Client::Connect(proxy_.address()).value()),
-        stream_(client_.Deform(session_, delivery).value()) {}
+        stream_(client_.Deform(session_, OptionsFor(delivery, holds_weights))
+                    .value()) {}
 
   // Until the last pose was answered. Returns how many were sent.
   uint64_t Run() {
@@ -70,14 +72,25 @@ class CutDrag {
         EXPECT_GT(frame.revision, *last_);
       }
       last_ = frame.revision;
+      encoding_ = frame.encoding;
       answered_ = frame.answers_sequence;
     }
   }
 
   RunningServer& server() { return server_; }
   const std::string& session() const { return session_; }
+  // Of the last frame.
+  const std::string& encoding() const { return encoding_; }
 
  private:
+  DeformOptions OptionsFor(Delivery delivery, bool holds_weights) {
+    DeformOptions options{.delivery = delivery};
+    if (holds_weights) {
+      const SessionInfo session = client_.GetSession(session_).value();
+      options.weights = client_.DownloadBinding(session.binding_id).value();
+    }
+    return options;
+  }
   void Arm() {
     std::uniform_int_distribution<int64_t> bytes(1, 20'000);
     cuts_to_come_ = proxy_.cuts() + 1;
@@ -99,6 +112,7 @@ class CutDrag {
   bool up_ = true;
   uint64_t answered_ = 0;
   std::optional<uint64_t> last_;
+  std::string encoding_;
 };
 
 TEST(Resume, CutsDuringADragLoseNoPoseAndDuplicateNone) {
@@ -111,6 +125,13 @@ TEST(Resume, CutsDuringADragLoseNoPoseAndDuplicateNone) {
   auto late = drag.server().client().Deform(drag.session()).value();
   EXPECT_EQ(late.joined().pose.vertices.row(7),
             DragTo(static_cast<int64_t>(poses)).positions.row(0));
+}
+
+TEST(Resume, SoDoesWhoHoldsTheWeightsAndGetsPoses) {
+  CutDrag drag(TestOptions(), Delivery::kEvery, true);
+  const uint64_t poses = drag.Run();
+  EXPECT_EQ(drag.server().client().GetSession(drag.session())->revision, poses);
+  EXPECT_EQ(drag.encoding(), "pose");
 }
 
 TEST(Resume, AViewOfTheNewestGoesOnAsWell) {

@@ -73,6 +73,7 @@ void CheckJoin(const v1::Join& message) {
   const FrameFormat& format = wanted->format;
   FUZZ_EXPECT(format.encoding != nullptr);
   FUZZ_EXPECT(format.encoding->is_exact() == (format.tolerance == 0));
+  FUZZ_EXPECT(wanted->otherwise.encoding->needs() == Needs::kNothing);
   FUZZ_EXPECT(wanted->interval.count() >= 0);
   FUZZ_EXPECT(wanted->interval <= std::chrono::seconds(100));
   FUZZ_EXPECT(!join->tenant.empty() && !join->session_id.empty());

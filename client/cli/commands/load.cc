@@ -78,6 +78,7 @@ absl::Status Complete(Options& options) {
   }
   load.frames.normals = options.normals;
   options.stage.frame_tolerance = options.frames.tolerance;
+  options.stage.hold_weights = options.frames.NeedsWeights();
   options.stage.check = load.check_interval.count() > 0;
   options.stage.editors = load.editors;
   options.stage.rate = load.rate;

@@ -322,7 +322,7 @@ TEST(ConvertJoin, RefusesWhatItDoesNotKnow) {
   EXPECT_EQ(DetailOf(status).reason, "UNKNOWN_ENCODING");
   EXPECT_EQ(status.message(),
             "none of the encodings is known; known: float32, quantized16, "
-            "predicted");
+            "predicted, pose");
   join.set_delivery(static_cast<v1::Delivery>(5));
   status = FromProto(join).status();
   EXPECT_EQ(status.message(), "delivery 5 is not known");

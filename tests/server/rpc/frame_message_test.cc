@@ -81,8 +81,9 @@ TEST(FrameMessage, TellsNoOriginThatIsKnown) {
 
 TEST(FrameMessage, TellsWhatAFrameOnAGridRefersTo) {
   const auto frame = TwoChunks();
-  frame->grid = std::make_shared<const RevisionGrid>(
-      RevisionGrid{.revision = 300, .step = 0.25, .grid = Grid(3)});
+  frame->encoding = FindEncoding("predicted");
+  frame->held = std::make_shared<const HeldRevision>(
+      HeldRevision{.revision = 300, .step = 0.25, .content = Grid(3)});
   frame->error_bound = 0.5;
   EXPECT_TRUE(Parsed({.frame = frame}, 0).keyframe());
   frame->reference_revision = 298;

@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "core/base/error.h"
+#include "core/base/status_macros.h"
 #include "tests/server/sessions/support.h"
 
 namespace deform::server {
@@ -20,7 +21,9 @@ const FrameEncoding* const kPredicted = FindEncoding("predicted");
 const double kDiagonal = std::sqrt(12.0);
 
 absl::StatusOr<FrameFormat> Pick(const FrameWishes& wishes) {
-  return PickFormat(wishes, Rig(BallCage()));
+  DEFORM_ASSIGN_OR_RETURN(const FrameFormats formats,
+                          PickFormats(wishes, Rig(BallCage())));
+  return formats.format;
 }
 
 TEST(PickFormat, Float32NeedsNoWords) {
@@ -70,6 +73,25 @@ TEST(PickFormat, TheCheapestIsWhatKeepsTheToleranceInFewestBytes) {
 TEST(PickFormat, ReceiversOfFloatsShareWhateverTheirTolerance) {
   EXPECT_EQ(Pick({.encodings = {kFloat32}, .tolerance = 0.01}).value(),
             Pick({}).value());
+}
+
+TEST(PickFormats, WhatNeedsWeightsComesWithOneThatNeedsNone) {
+  const FrameEncoding* const pose = FindEncoding("pose");
+  const auto pick = [](const FrameWishes& wishes) {
+    return PickFormats(wishes, Rig(BallCage())).value();
+  };
+  const FrameFormats formats = pick({.encodings = {pose}});
+  EXPECT_EQ(formats.format.encoding, pose);
+  EXPECT_EQ(formats.otherwise.encoding, kFloat32);
+  const FrameFormats cheapest =
+      pick({.encodings = {kFloat32, pose, kPredicted, kQuantized16},
+            .cheapest = true,
+            .tolerance = 0.01});
+  EXPECT_EQ(cheapest.format.encoding, pose);
+  EXPECT_EQ(cheapest.otherwise.encoding, kPredicted);
+  EXPECT_EQ(cheapest.otherwise.tolerance, 0.01);
+  const FrameFormats none = pick({});
+  EXPECT_EQ(none.otherwise, none.format);
 }
 
 // For the ball in its cage.

@@ -63,9 +63,10 @@ class RigChangeTest : public testing::Test {
     return moves_.outcomes().back().moved;
   }
 
-  FakeStream Join(Delivery delivery = Delivery::kLatest) {
+  FakeStream Join(Delivery delivery = Delivery::kLatest,
+                  const FrameWishes& wishes = {}) {
     FakeStream stream;
-    auto joined = session_->Join(delivery, FrameWishes{}, stream.receiver);
+    auto joined = session_->Join(delivery, wishes, stream.receiver);
     stream.participant = std::move(joined->participant);
     stream.joined = joined->state;
     stream.pose = joined->pose;
@@ -152,6 +153,31 @@ TEST_F(RigChangeTest, KeepsThePoseAndTellsTheTrueJump) {
   EXPECT_NEAR(change->largest_jump, jump, 4e-6);
   EXPECT_GT(change->largest_jump, 0);
   EXPECT_EQ(Outcome()->largest_jump, change->largest_jump);
+}
+
+TEST_F(RigChangeTest, PosesComeAgainOnceTheNewWeightsAreHeld) {
+  for (const Delivery delivery : {Delivery::kLatest, Delivery::kEvery}) {
+    session_ = sessions_.Create("t", first_->id, "").value();
+    FakeStream stream = Join(delivery, {.encodings = {FindEncoding("pose")},
+                                        .weights = {.binding = first_->id}});
+    executor_.RunAll();
+    EXPECT_EQ(stream.TakeFrame().frame->encoding->id(), "pose");
+    EXPECT_FALSE(stream.participant->Take().has_value());
+    const Edited edited = Edit(*first_, {add_});
+    Move(edited);
+    executor_.RunAll();
+    TakeChange(stream);
+    const FrameToSend other = stream.TakeFrame();
+    EXPECT_EQ(other.frame->encoding->id(), "float32");
+    EXPECT_EQ(other.skipped_revisions, 0u);
+    EXPECT_FALSE(stream.participant->Take().has_value());
+    stream.participant->Hold({.binding = edited.record->id});
+    stream.participant->Submit(1, MoveVertex(0, {-1, -1, -1.5}));
+    executor_.RunAll();
+    const FrameToSend again = stream.TakeFrame();
+    EXPECT_EQ(again.frame->encoding->id(), "pose");
+    EXPECT_FALSE(again.frame->reference_revision.has_value());
+  }
 }
 
 TEST_F(RigChangeTest, DoesNotJumpAtRest) {

@@ -214,7 +214,8 @@ class FrameDecoder {
     const int64_t points =
         frame.chunks.back().first_vertex + frame.chunks.back().vertex_count;
     std::vector<float> all(points * frame.dimension);
-    Grid grid(frame.grid == nullptr ? 0 : points);
+    const bool on_grid = frame.encoding->uses_grid();
+    Grid grid(on_grid ? points : 0);
     if (frame.reference_revision) {
       EXPECT_TRUE(held_.has_value());
       EXPECT_EQ(*frame.reference_revision, held_revision_);
@@ -230,12 +231,12 @@ class FrameDecoder {
                    .positions = std::span(all).subspan(
                        chunk.first_vertex * frame.dimension,
                        chunk.vertex_count * frame.dimension),
-                   .grid = frame.grid == nullptr ? nullptr : &grid,
+                   .grid = on_grid ? &grid : nullptr,
                    .reference = frame.reference_revision ? &*held_ : nullptr})
               .ok());
     }
-    if (frame.grid != nullptr) {
-      TakeOffGrid(grid, frame.grid->step, *frame.order, frame.dimension, all);
+    if (on_grid) {
+      TakeOffGrid(grid, frame.held->step, *frame.order, frame.dimension, all);
       held_ = std::move(grid);
       held_revision_ = frame.info.revision;
     }

@@ -64,69 +64,80 @@ absl::StatusOr<std::vector<int64_t>> ParsePoints(const std::string& text) {
 
 void RigOptions::AddTo(CLI::App& app, bool both) {
   auto* const group = app.add_option_group("Rig", "What the model hangs on");
-  auto* const cage_option =
-      group
-          ->add_option("--cage", cage,
-                       "Closed mesh around the model; in 2D loops of OBJ 'l' "
-                       "elements")
-          ->type_name("FILE");
-  auto* const handles_option =
-      group
-          ->add_option("--handles", handles,
-                       "Control points: a file's vertices")
-          ->type_name("FILE");
-  if (!both) handles_option->excludes(cage_option);
-  group
-      ->add_option("--scheme", scheme,
-                   "Coordinate scheme, see 'list schemes'; by default green "
-                   "for a cage, s_cc for handles")
-      ->type_name("NAME");
-  group
-      ->add_option("--exit", exit,
-                   "How points outside the cage are reached: 'auto', or the "
-                   "faces they leave through, such as 3,17. Faces are counted "
-                   "from 0, as triangles: a polygon of k corners in the file "
-                   "counts as k - 2 of them, in its place")
-      ->type_name("auto|FACE,...");
-  group
-      ->add_option("--exit-per-point", exit_per_point,
-                   "Exit face of each model point, -1 for none")
-      ->type_name("FILE")
-      ->excludes("--exit");
-  group
-      ->add_option("--unbindable", unbindable,
-                   "Points that cannot be bound: refuse them, or bind the rest "
-                   "and report them")
-      ->check(CLI::IsMember({"fail", "report"}))
-      ->capture_default_str();
-  group
-      ->add_option("--clamp", clamp,
-                   "Points of the model that stay at rest whatever the pose, "
-                   "as list or file; they may lie outside of the rig")
-      ->type_name("LIST|FILE");
-  group->add_flag("--flip-cage", flip_cage, "Turn an inside-out cage");
-  group
-      ->add_flag("--add-box", add_box,
-                 "Also the corners of the model's box, 1.6 times as large, as "
-                 "handles that stay fixed: then the model lies inside them")
-      ->needs(handles_option);
-  group
-      ->add_option("--handle-weights", handle_weights,
-                   "t_cc: weight s >= 0 of each handle, as list or file")
-      ->type_name("LIST|FILE");
-  group->add_option("--lambda", lambda,
-                    "s_cc: the paper's lambda > 1; it has no effect");
-  group
-      ->add_option("--weight-tolerance", weight_tolerance,
-                   "How far compressed weights may move a point, as a fraction "
-                   "of the rig's diagonal: 1e-6 to 1e-2, or 0 for dense ones; "
-                   "by default the server's")
-      ->type_name("FRACTION");
+  AddRigTo(*group, both);
+  AddPointsTo(*group);
+  AddWeightsTo(*group);
   group
       ->add_option("--dimension", dimension,
                    "2 or 3; by default 2 if the files are flat")
       ->check(CLI::IsMember({2, 3}))
       ->type_name("N");
+}
+
+void RigOptions::AddRigTo(CLI::App& group, bool both) {
+  auto* const cage_option =
+      group
+          .add_option("--cage", cage,
+                      "Closed mesh around the model; in 2D loops of OBJ 'l' "
+                      "elements")
+          ->type_name("FILE");
+  auto* const handles_option =
+      group
+          .add_option("--handles", handles, "Control points: a file's vertices")
+          ->type_name("FILE");
+  if (!both) handles_option->excludes(cage_option);
+  group.add_flag("--flip-cage", flip_cage, "Turn an inside-out cage");
+  group
+      .add_flag("--add-box", add_box,
+                "Also the corners of the model's box, 1.6 times as large, as "
+                "handles that stay fixed: then the model lies inside them")
+      ->needs(handles_option);
+}
+
+void RigOptions::AddPointsTo(CLI::App& group) {
+  group
+      .add_option("--exit", exit,
+                  "How points outside the cage are reached: 'auto', or the "
+                  "faces they leave through, such as 3,17. Faces are counted "
+                  "from 0, as triangles: a polygon of k corners in the file "
+                  "counts as k - 2 of them, in its place")
+      ->type_name("auto|FACE,...");
+  group
+      .add_option("--exit-per-point", exit_per_point,
+                  "Exit face of each model point, -1 for none")
+      ->type_name("FILE")
+      ->excludes("--exit");
+  group
+      .add_option("--unbindable", unbindable,
+                  "Points that cannot be bound: refuse them, or bind the rest "
+                  "and report them")
+      ->check(CLI::IsMember({"fail", "report"}))
+      ->capture_default_str();
+  group
+      .add_option("--clamp", clamp,
+                  "Points of the model that stay at rest whatever the pose, "
+                  "as list or file; they may lie outside of the rig")
+      ->type_name("LIST|FILE");
+}
+
+void RigOptions::AddWeightsTo(CLI::App& group) {
+  group
+      .add_option("--scheme", scheme,
+                  "Coordinate scheme, see 'list schemes'; by default green "
+                  "for a cage, s_cc for handles")
+      ->type_name("NAME");
+  group
+      .add_option("--handle-weights", handle_weights,
+                  "t_cc: weight s >= 0 of each handle, as list or file")
+      ->type_name("LIST|FILE");
+  group.add_option("--lambda", lambda,
+                   "s_cc: the paper's lambda > 1; it has no effect");
+  group
+      .add_option("--weight-tolerance", weight_tolerance,
+                  "How far compressed weights may move a point, as a fraction "
+                  "of the rig's diagonal: 1e-6 to 1e-2, or 0 for dense ones; "
+                  "by default the server's")
+      ->type_name("FRACTION");
 }
 
 absl::StatusOr<ExitRegions> ParseExits(const std::string& text) {

@@ -32,6 +32,11 @@ struct RigOptions {
   void AddTo(CLI::App& app, bool both = false);
   // Whether any rig was given.
   bool given() const { return !cage.empty() || !handles.empty(); }
+
+ private:
+  void AddRigTo(CLI::App& group, bool both);
+  void AddPointsTo(CLI::App& group);
+  void AddWeightsTo(CLI::App& group);
 };
 
 // "auto" or a list of faces, "0,4,7". A usage error otherwise.

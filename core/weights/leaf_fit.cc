@@ -103,6 +103,10 @@ void Put(double value, std::byte* to) {
 
 void LeafFitter::Pack(const std::vector<int64_t>& sorted, LeafFit& fit) const {
   const MixedColumns& columns = fit.columns;
+  // Without a step, only columns of zeros are integers.
+  const auto steps = [&](double value) {
+    return fit.step > 0 ? std::round(value / fit.step) : 0;
+  };
   const int64_t blocks = (points() + kBlockPoints - 1) / kBlockPoints;
   fit.numbers.assign(blocks * columns.block_bytes(), std::byte{0});
   for (int64_t i = 0; i < points(); ++i) {
@@ -115,10 +119,10 @@ void LeafFitter::Pack(const std::vector<int64_t>& sorted, LeafFit& fit) const {
         Put<float>(value, block + 4 * in_block);
         block += 4 * kBlockPoints;
       } else if (k < columns.floats + columns.shorts) {
-        Put<int16_t>(std::round(value / fit.step), block + 2 * in_block);
+        Put<int16_t>(steps(value), block + 2 * in_block);
         block += 2 * kBlockPoints;
       } else {
-        Put<int8_t>(std::round(value / fit.step), block + in_block);
+        Put<int8_t>(steps(value), block + in_block);
         block += kBlockPoints;
       }
     }

@@ -1,45 +1,26 @@
 // Bindings with compressed weights, large and tiny.
 #pragma once
 
-#include <cmath>
 #include <cstring>
 #include <memory>
 #include <random>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include "core/deform/deformer.h"
 #include "core/weights/binding.h"
+#include "tests/support/ball_request.h"
 #include "tests/support/shapes.h"
 
 namespace deform {
 
-// `count` points in the unit disk or ball, many of them near its surface,
-// around `center`; points 3 and 5 are clamped.
-inline BindRequest InBall(const CoordinateScheme& scheme, int dimension,
-                          int count, double tolerance,
-                          const Vec3& center = Vec3::Zero()) {
-  Shape rig = dimension == 2 ? RegularLoop2d(1, 19) : Icosphere(1, 1);
-  std::mt19937 random(6);
-  std::normal_distribution<double> normal;
-  std::uniform_real_distribution<double> uniform(0, 1);
-  Positions points = Positions::Zero(count, 3);
-  for (auto point : points.rowwise()) {
-    for (int d = 0; d < dimension; ++d) point(d) = normal(random);
-    point *= (1 - std::pow(uniform(random), 3)) * 0.78 / point.norm();
-  }
-  points.rowwise() += center.transpose();
-  rig.positions.rowwise() += center.transpose();
-  BindRequest request{.model = std::make_shared<const Mesh>(
-                          *Mesh::Create(dimension, points, Faces(0, 3))),
-                      .rig = CageOf(rig),
-                      .scheme = std::string(scheme.id()),
-                      .weight_tolerance = tolerance,
-                      .clamped = {3, 5}};
-  if (scheme.rig_kind() == RigKind::kHandles) {
-    request.rig = *Handles::Create(dimension, rig.positions);
-  }
+// InBall(), to be compressed, with points 3 and 5 clamped.
+inline BindRequest CompressedInBall(const CoordinateScheme& scheme,
+                                    int dimension, int count, double tolerance,
+                                    const Vec3& center = Vec3::Zero()) {
+  BindRequest request = InBall(scheme, dimension, count, center);
+  request.weight_tolerance = tolerance;
+  request.clamped = {3, 5};
   return request;
 }
 

@@ -51,9 +51,11 @@ void ExpectSame(const LeafBasis& a, const LeafBasis& b) {
 TEST(LeafBasis, ComesBackAsItWas) {
   for (const int dimension : {2, 3}) {
     for (const double tolerance : {1e-3, 1e-6}) {
-      const auto basis = LeafBasis::Of(
-          Bind(InBall(**FindScheme("green"), dimension, 3000, tolerance), {})
-              .value());
+      const auto basis =
+          LeafBasis::Of(Bind(CompressedInBall(**FindScheme("green"), dimension,
+                                              3000, tolerance),
+                             {})
+                            .value());
       const std::vector<uint8_t> bytes = basis->ToBytes();
       EXPECT_EQ(std::ssize(bytes), basis->byte_count());
       const auto received = Received(bytes);
@@ -65,7 +67,7 @@ TEST(LeafBasis, ComesBackAsItWas) {
 
 TEST(LeafBasis, HasTheNumbersAndPlacesOfItsBinding) {
   const std::shared_ptr<const Binding> binding =
-      Bind(InBall(**FindScheme("green"), 3, 2000, 1e-5), {}).value();
+      Bind(CompressedInBall(**FindScheme("green"), 3, 2000, 1e-5), {}).value();
   const auto basis = Received(LeafBasis::Of(binding)->ToBytes());
   const CompressedWeights& weights = *binding->compressed();
   EXPECT_EQ(Positions(basis->rest()), binding->model()->positions());
@@ -101,14 +103,15 @@ TEST(LeafBasis, HasTheNumbersAndPlacesOfItsBinding) {
 
 TEST(LeafBasis, IsTheSameBytesForTheSameWeights) {
   ThreadPool pool({.threads = 3});
-  const BindRequest request = InBall(**FindScheme("s_cc"), 3, 3000, 1e-5);
+  const BindRequest request =
+      CompressedInBall(**FindScheme("s_cc"), 3, 3000, 1e-5);
   EXPECT_EQ(LeafBasis::Of(Bind(request, {}).value())->ToBytes(),
             LeafBasis::Of(Bind(request, {.pool = &pool}).value())->ToBytes());
 }
 
 TEST(LeafBasis, IsSentInPiecesWithoutACopy) {
   const std::shared_ptr<const Binding> binding =
-      Bind(InBall(**FindScheme("green"), 3, 5000, 1e-4), {}).value();
+      Bind(CompressedInBall(**FindScheme("green"), 3, 5000, 1e-4), {}).value();
   const auto basis = LeafBasis::Of(binding);
   std::vector<uint8_t> all;
   bool of_model = false;
@@ -124,7 +127,7 @@ TEST(LeafBasis, IsSentInPiecesWithoutACopy) {
 }
 
 TEST(LeafBasis, MayMoveNobody) {
-  BindRequest request = InBall(**FindScheme("green"), 3, 40, 1e-4);
+  BindRequest request = CompressedInBall(**FindScheme("green"), 3, 40, 1e-4);
   request.clamped.clear();
   for (int64_t i = 0; i < 40; ++i) request.clamped.push_back(i);
   const auto basis =

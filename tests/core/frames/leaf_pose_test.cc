@@ -87,7 +87,7 @@ class LeafPoses
       double tolerance, const Vec3& center = Vec3::Zero()) const {
     const auto [scheme, dimension] = GetParam();
     auto binding =
-        Bind(InBall(*scheme, dimension, 1500, tolerance, center), {});
+        Bind(CompressedInBall(*scheme, dimension, 1500, tolerance, center), {});
     EXPECT_TRUE(binding.ok()) << binding.status();
     return *binding;
   }
@@ -157,7 +157,8 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(LeafPose, IsTheSameOnAllThreads) {
   ThreadPool pool({.threads = 3});
   const auto binding =
-      Bind(InBall(**FindScheme("green"), 3, 12000, 1e-4), {.pool = &pool})
+      Bind(CompressedInBall(**FindScheme("green"), 3, 12000, 1e-4),
+           {.pool = &pool})
           .value();
   Session alone(binding), together(binding, &pool);
   const Pose pose = Shaken(*binding, 1, 0.2);
@@ -175,7 +176,7 @@ constexpr double kOtherSums = 30 * 6e-8 * kDiagonal;
 
 TEST(LeafPose, ComesOutNearlySoWithOtherVectorInstructions) {
   const auto binding =
-      Bind(InBall(**FindScheme("green"), 3, 1500, 1e-5), {}).value();
+      Bind(CompressedInBall(**FindScheme("green"), 3, 1500, 1e-5), {}).value();
   Session session(binding);
   session.MoveTo(Shaken(*binding, 1, 0.2));
   const auto frame = session.Frame(0);
@@ -188,7 +189,7 @@ TEST(LeafPose, ComesOutNearlySoWithOtherVectorInstructions) {
 
 TEST(LeafPose, LeavesFixedPointsAtRest) {
   const auto binding =
-      Bind(InBall(**FindScheme("green"), 3, 1000, 1e-4), {}).value();
+      Bind(CompressedInBall(**FindScheme("green"), 3, 1000, 1e-4), {}).value();
   Session session(binding);
   Pose pose = Shaken(*binding, 1, 0.2);
   pose.vertices.rowwise() += Eigen::RowVector3d(10, 0, 0);

@@ -14,6 +14,7 @@
 #include "core/base/error.h"
 #include "core/deform/weighted_sums.h"
 #include "core/weights/compress_binding.h"
+#include "tests/support/ball_request.h"
 #include "tests/support/detailed_model.h"
 #include "tests/support/shapes.h"
 
@@ -21,32 +22,6 @@ namespace deform {
 namespace {
 
 using BindingPtr = std::shared_ptr<const Binding>;
-
-BindRequest RequestOf(Mesh model, const Shape& rig,
-                      const CoordinateScheme& scheme) {
-  BindRequest request{.model = std::make_shared<const Mesh>(std::move(model)),
-                      .rig = CageOf(rig),
-                      .scheme = std::string(scheme.id())};
-  if (scheme.rig_kind() == RigKind::kHandles) {
-    request.rig = *Handles::Create(request.model->dimension(), rig.positions);
-  }
-  return request;
-}
-
-// Points spread in the unit disk or ball, many of them close to the cage of the
-// property tests and, all the more, within its handles' hull.
-BindRequest InBall(const CoordinateScheme& scheme, int dimension, int count) {
-  Shape rig = dimension == 2 ? RegularLoop2d(1, 19) : Icosphere(1, 1);
-  std::mt19937 random(6);
-  std::normal_distribution<double> normal;
-  std::uniform_real_distribution<double> uniform(0, 1);
-  Positions points = Positions::Zero(count, 3);
-  for (auto point : points.rowwise()) {
-    for (int d = 0; d < dimension; ++d) point(d) = normal(random);
-    point *= (1 - std::pow(uniform(random), 3)) * 0.78 / point.norm();
-  }
-  return RequestOf(*Mesh::Create(dimension, points, Faces(0, 3)), rig, scheme);
-}
 
 BindingPtr Dense(const BindRequest& request) {
   auto binding = Bind(request, {});

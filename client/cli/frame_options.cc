@@ -6,7 +6,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "client/cli/exit_code.h"
-#include "core/frames/encoding.h"
+#include "client/cli/progress.h"
+#include "core/base/status_macros.h"
 
 namespace deform::cli {
 namespace {
@@ -39,17 +40,39 @@ void FrameOptions::AddTo(CLI::App& app) {
   app.add_option("--encoding", encodings,
                  "Frame encodings to accept, best first; auto: the one that "
                  "takes fewest bytes; pose: only the pose comes, and this "
-                 "program deforms, with weights that it downloads before")
+                 "program deforms, with weights that it downloads before; "
+                 "basis: leaf coefficients come, with a basis of the "
+                 "compressed weights, likewise")
       ->delimiter(',')
       ->type_name("NAME");
 }
 
-bool FrameOptions::NeedsWeights() const {
-  return std::any_of(
-      encodings.begin(), encodings.end(), [](const std::string& name) {
-        const FrameEncoding* const encoding = FindEncoding(name);
-        return encoding != nullptr && encoding->needs() != Needs::kNothing;
-      });
+bool FrameOptions::Need(Needs what) const {
+  return std::any_of(encodings.begin(), encodings.end(),
+                     [&](const std::string& name) {
+                       const FrameEncoding* const encoding = FindEncoding(name);
+                       return encoding != nullptr && encoding->needs() == what;
+                     });
+}
+
+absl::Status FrameOptions::Download(Client& client,
+                                    const std::string& binding_id,
+                                    Context& context,
+                                    DeformOptions& frames) const {
+  if (Need(Needs::kWeights)) {
+    Progress progress(context.console, "downloading weights",
+                      &context.interruption);
+    DEFORM_ASSIGN_OR_RETURN(
+        frames.weights,
+        client.DownloadBinding(binding_id, progress.callback()));
+  }
+  if (Need(Needs::kBasis)) {
+    Progress progress(context.console, "downloading the basis",
+                      &context.interruption);
+    DEFORM_ASSIGN_OR_RETURN(
+        frames.basis, client.DownloadBasis(binding_id, progress.callback()));
+  }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<DeformOptions> FrameOptions::For(Delivery delivery) const {

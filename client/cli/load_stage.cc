@@ -185,6 +185,10 @@ absl::Status LoadStage::AddTarget(const LoadStageOptions& options,
     DEFORM_ASSIGN_OR_RETURN(targets_.back().weights,
                             client_.DownloadBinding(binding.binding_id));
   }
+  if (options.hold_basis) {
+    DEFORM_ASSIGN_OR_RETURN(targets_.back().basis,
+                            client_.DownloadBasis(binding.binding_id));
+  }
   return absl::OkStatus();
 }
 

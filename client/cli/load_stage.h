@@ -27,7 +27,9 @@ struct LoadStageOptions {
   bool check = true;
   double tolerance = 1e-6;  // Beside that of compressed weights and:
   double frame_tolerance = 0;
-  bool hold_weights = false;  // Participants deform by themselves.
+  // What participants hold, to deform by themselves.
+  bool hold_weights = false;
+  bool hold_basis = false;
 };
 
 // "drag", "jitter", "whole", "recorded".

@@ -36,6 +36,18 @@ grpc::ChannelArguments ChannelArguments() {
   return arguments;
 }
 
+bool Holds(const DeformOptions& options, Needs what) {
+  switch (what) {
+    case Needs::kNothing:
+      return true;
+    case Needs::kWeights:
+      return options.weights.binding != nullptr;
+    case Needs::kBasis:
+      return options.basis.basis != nullptr;
+  }
+  return false;
+}
+
 v1::Join JoinOf(absl::string_view session_id, const std::string& tenant,
                 const DeformOptions& wanted) {
   v1::Join join;
@@ -54,16 +66,17 @@ v1::Join JoinOf(absl::string_view session_id, const std::string& tenant,
     join.set_tolerance_fraction(*wanted.tolerance_fraction);
   }
   join.mutable_held()->set_binding_id(wanted.weights.binding_id);
+  join.mutable_held()->set_basis_id(wanted.basis.basis_id);
   join.mutable_encodings()->Add(wanted.encodings.begin(),
                                 wanted.encodings.end());
   if (!wanted.encodings.empty()) return join;
-  const bool holds = wanted.weights.binding != nullptr;
   const bool inexact = wanted.tolerance || wanted.tolerance_fraction;
-  join.set_cheapest_encoding(inexact || holds);
+  join.set_cheapest_encoding(inexact || wanted.weights.binding != nullptr);
   for (const FrameEncoding* encoding : AllEncodings()) {
     if (!inexact && !encoding->is_exact()) continue;
-    if (!holds && encoding->needs() != Needs::kNothing) continue;
-    join.add_encodings(ToString(encoding->id()));
+    if (Holds(wanted, encoding->needs())) {
+      join.add_encodings(ToString(encoding->id()));
+    }
   }
   return join;
 }

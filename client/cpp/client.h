@@ -77,7 +77,7 @@ struct QualityQuery {
   bool with_points = false;
 };
 
-// Done and total: bytes of a model, points of a binding or a report. Called
+// Done and total: bytes of a download, points of a binding or a report. Called
 // on the calling thread. False gives up: the server stops and the call returns
 // Cancelled.
 using ProgressCallback = std::function<bool(int64_t done, int64_t total)>;
@@ -137,6 +137,15 @@ class Client {
   absl::StatusOr<HeldBinding> DownloadBinding(
       absl::string_view binding_id, const ProgressCallback& progress = {});
 
+  // The leaf basis of a binding's compressed weights, to receive leaf
+  // coefficients instead of frames (DeformOptions::basis). Waits while weights
+  // are being compressed. `known` is given back if the server has it still:
+  // then nothing is downloaded. FailedPrecondition NO_BASIS if weights stay
+  // dense.
+  absl::StatusOr<HeldBasis> DownloadBasis(absl::string_view binding_id,
+                                          const ProgressCallback& progress = {},
+                                          const HeldBasis& known = {});
+
   // How a binding came out, and what a pose does to its model.
   absl::StatusOr<QualityInfo> GetQuality(const QualityQuery& query,
                                          const ProgressCallback& progress = {});
@@ -169,6 +178,10 @@ class Client {
  private:
   struct Impl;
   explicit Client(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+  // Until the weights stay in the form that they have.
+  absl::Status AwaitForm(absl::string_view binding_id,
+                         const ProgressCallback& progress);
 
   std::shared_ptr<Impl> impl_;
 };

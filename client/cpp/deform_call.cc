@@ -29,6 +29,7 @@ class Call final
       : events_(events),
         normals_(options.normals),
         held_weights_(options.weights),
+        held_basis_(options.basis),
         weights_(options.pool) {
     MutexLock lock(mutex_);  // What is set up here is seen by reactions.
     stub.async()->Deform(&context_, this);
@@ -143,6 +144,10 @@ class Call final
       DEFORM_RETURN_IF_ERROR(HeldWeights::Check(held_weights_, joined));
       weights_.Add(held_weights_, joined.binding_id);
     }
+    if (held_basis_.basis != nullptr) {
+      DEFORM_RETURN_IF_ERROR(HeldWeights::Check(held_basis_, joined));
+      weights_.Add(held_basis_);
+    }
     assembler_.emplace(joined.dimension, joined.point_count, normals_,
                        &weights_);
     assembler_->BeginBinding(joined.binding_id);
@@ -177,6 +182,7 @@ class Call final
   DeformEvents& events_;
   const bool normals_;  // Were asked for.
   const HeldBinding held_weights_;
+  const HeldBasis held_basis_;
   grpc::ClientContext context_;
 
   // The reading side's. Its reactions come one after the other, on any thread;

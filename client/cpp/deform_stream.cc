@@ -89,6 +89,9 @@ const std::vector<RigChange>& DeformStream::rig_changes() const {
 absl::Status DeformStream::Hold(const HeldBinding& weights) {
   return impl_->Hold(weights);
 }
+absl::Status DeformStream::Hold(const HeldBasis& basis) {
+  return impl_->Hold(basis);
+}
 absl::Status DeformStream::NextFrame(Frame& frame) {
   return impl_->NextFrame(frame);
 }

@@ -19,12 +19,20 @@
 namespace deform {
 
 class Binding;
+class LeafBasis;
 class ThreadPool;
 
 // A binding of the server's that this program has, in whatever form.
 struct HeldBinding {
   std::string binding_id;
   std::shared_ptr<const Binding> binding;
+};
+
+// What the server has of a binding's compressed weights for frames of encoding
+// "basis", in this program.
+struct HeldBasis {
+  std::string basis_id;
+  std::shared_ptr<const LeafBasis> basis;
 };
 
 // Which frames a participant gets.
@@ -72,7 +80,7 @@ struct DeformOptions {
   std::optional<double> tolerance_fraction;
   // Frame encodings to choose from, best first (frame.proto). Empty: "pose" if
   // there are `weights`; else "float32", or, with a tolerance, whichever takes
-  // fewest bytes.
+  // fewest bytes, "basis" if there is a `basis`.
   std::vector<std::string> encodings;
   // With kLatest, frames a second at most, 0.01 to 1000; 0: as they come. The
   // last state always comes.
@@ -84,6 +92,10 @@ struct DeformOptions {
   // poses (encoding "pose") and are deformed here, on `pool` (borrowed; may be
   // null). Frame::error_bound is then that of these weights.
   HeldBinding weights = {};
+  // Of the session's binding, if its weights are compressed
+  // (Client::DownloadBasis): with it frames can come as leaf coefficients
+  // (encoding "basis") and are summed up here, likewise.
+  HeldBasis basis = {};
   ThreadPool* pool = nullptr;
 
   ParticipantRole role = ParticipantRole::kEditor;
@@ -142,6 +154,9 @@ struct Frame {
   // How far compressed weights and the encoding may have moved any vertex, in
   // model units, beside roundings to float.
   double error_bound = 0;
+  // Which basis Client::DownloadBasis has for the weights of this frame, as far
+  // as the server tells: it does in sessions in which somebody takes "basis".
+  std::string basis_id;
 
   int64_t point_count() const {
     return static_cast<int64_t>(positions.size()) / dimension;
@@ -255,6 +270,8 @@ class DeformStream {
   // After a rig change frames come in another encoding until the weights of its
   // binding are here. InvalidArgument OTHER_MODEL.
   absl::Status Hold(const HeldBinding& weights);
+  // Likewise DeformOptions::basis, when Frame::basis_id tells of another.
+  absl::Status Hold(const HeldBasis& basis);
 
   // Part of the receiving side: who takes part, if on_participants is set; what
   // came with the last refusal; how often the connection broke and came back.

@@ -54,6 +54,10 @@ absl::Status DeformStream::Impl::Join() {
     DEFORM_RETURN_IF_ERROR(HeldWeights::Check(options_.weights, joined_));
     weights_.Add(options_.weights, binding_id());
   }
+  if (options_.basis.basis != nullptr) {
+    DEFORM_RETURN_IF_ERROR(HeldWeights::Check(options_.basis, joined_));
+    weights_.Add(options_.basis);
+  }
   return Adopt(std::move(link), joined);
 }
 
@@ -256,6 +260,17 @@ absl::Status DeformStream::Impl::Hold(const HeldBinding& weights) {
   DEFORM_RETURN_IF_ERROR(HeldWeights::Check(weights, joined_));
   weights_.Add(weights, binding_id());
   join_.mutable_held()->set_binding_id(weights.binding_id);
+  return TellHeld();
+}
+
+absl::Status DeformStream::Impl::Hold(const HeldBasis& basis) {
+  DEFORM_RETURN_IF_ERROR(HeldWeights::Check(basis, joined_));
+  weights_.Add(basis);
+  join_.mutable_held()->set_basis_id(basis.basis_id);
+  return TellHeld();
+}
+
+absl::Status DeformStream::Impl::TellHeld() {
   v1::DeformRequest request;
   *request.mutable_held() = join_.held();
   return Tell(std::move(request));

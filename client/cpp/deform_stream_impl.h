@@ -48,6 +48,7 @@ class DeformStream::Impl {
   // The receiving side.
   absl::Status NextFrame(Frame& frame);
   absl::Status Hold(const HeldBinding& weights);
+  absl::Status Hold(const HeldBasis& basis);
   const std::vector<RigChange>& rig_changes() const { return rig_changes_; }
   const std::vector<ParticipantInfo>& participants() const {
     return participants_;
@@ -61,6 +62,8 @@ class DeformStream::Impl {
   void Cancel();
 
  private:
+  // Tells the server of `join_.held`.
+  absl::Status TellHeld();
   absl::Status Queue(uint64_t sequence, v1::DeformRequest request);
   // Sends what is unsent, unless another thread does.
   void Drain() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);

@@ -89,6 +89,8 @@ absl::Status FrameAssembler::Begin(const v1::FrameChunk& chunk, Frame& frame) {
   frame.bytes = 0;
   frame.keyframe = chunk.keyframe();
   frame.error_bound = chunk.error_bound();
+  if (chunk.has_basis_id()) basis_id_ = chunk.basis_id();
+  frame.basis_id = basis_id_;
   return absl::OkStatus();
 }
 
@@ -157,27 +159,42 @@ absl::StatusOr<bool> FrameAssembler::Add(const v1::FrameChunk& chunk,
   return true;
 }
 
-absl::Status FrameAssembler::Decode(const v1::FrameChunk& chunk, Frame& frame) {
+ChunkTarget FrameAssembler::TargetOf(const v1::FrameChunk& chunk,
+                                     Frame& frame) const {
   const auto count = static_cast<int64_t>(chunk.vertex_count());
   ChunkTarget target{
-      .dimension = dimension_, .first = next_vertex_, .count = count};
+      .dimension = dimension_,
+      .first = next_vertex_,
+      .count = count,
+      .positions = std::span<float>(frame.positions)
+                       .subspan(next_vertex_ * dimension_, count * dimension_),
+      .origin = origin_,
+      .error_bound = &frame.error_bound};
+  if (weights_ == nullptr) return target;
+  target.pool = weights_->pool();
+  if (encoding_->needs() == Needs::kWeights) {
+    target.deformer = weights_->Find(binding_id_);
+    if (refers_) target.reference_pose = &held_pose_->pose;
+  } else if (encoding_->needs() == Needs::kBasis) {
+    target.basis = weights_->FindBasis(basis_id_);
+  }
+  return target;
+}
+
+absl::Status FrameAssembler::Decode(const v1::FrameChunk& chunk, Frame& frame) {
   if (encoding_->uses_grid()) {
-    target.grid = &*grid_;
-    if (refers_) target.reference = &held_->grid;
+    ChunkTarget target{.dimension = dimension_,
+                       .first = next_vertex_,
+                       .count = static_cast<int64_t>(chunk.vertex_count()),
+                       .grid = &*grid_,
+                       .reference = refers_ ? &held_->grid : nullptr};
     return encoding_->Decode(BytesOf(chunk.data()), target);
   }
-  target.positions =
-      std::span<float>(frame.positions)
-          .subspan(next_vertex_ * dimension_, count * dimension_);
-  if (encoding_->needs() != Needs::kWeights) {
-    return encoding_->Decode(BytesOf(chunk.data()), target);
-  }
-  target.deformer = weights_ != nullptr ? weights_->Find(binding_id_) : nullptr;
-  target.origin = origin_;
-  target.error_bound = &frame.error_bound;
-  if (refers_) target.reference_pose = &held_pose_->pose;
+  const ChunkTarget target = TargetOf(chunk, frame);
   DEFORM_RETURN_IF_ERROR(encoding_->Decode(BytesOf(chunk.data()), target));
-  held_pose_ = HeldPose{revision_, target.deformer->pose()};
+  if (encoding_->needs() == Needs::kWeights) {
+    held_pose_ = HeldPose{revision_, target.deformer->pose()};
+  }
   return absl::OkStatus();
 }
 

@@ -22,8 +22,8 @@ namespace deform {
 // Not thread-safe.
 class FrameAssembler {
  public:
-  // `normals`: frames have them. Poses are deformed with `weights`, borrowed;
-  // null: there are none.
+  // `normals`: frames have them. `weights`: what is held, borrowed; null:
+  // nothing.
   FrameAssembler(int dimension, int64_t point_count, bool normals = false,
                  const HeldWeights* weights = nullptr)
       : dimension_(dimension),
@@ -61,6 +61,8 @@ class FrameAssembler {
   absl::Status CheckFollows(const v1::FrameChunk& chunk) const;
   absl::Status Decode(const v1::FrameChunk& chunk, Frame& frame);
   absl::Status ReadNormals(const v1::FrameChunk& chunk, Frame& frame) const;
+  // Of a chunk of positions, or of what they are made of.
+  ChunkTarget TargetOf(const v1::FrameChunk& chunk, Frame& frame) const;
   void FinishOnGrid(Frame& frame);
 
   const int dimension_;
@@ -68,6 +70,7 @@ class FrameAssembler {
   const bool normals_;
   const HeldWeights* const weights_;
   std::string binding_id_;
+  std::string basis_id_;  // As it was told.
   uint64_t newest_epoch_ = 0;
   bool have_origin_ = false;
   Vec3 origin_ = Vec3::Zero();

@@ -3,24 +3,24 @@
 
 #include <cstdint>
 #include <optional>
-#include <string>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/cpp/arrays.h"
+#include "client/cpp/chunked_bytes.h"
 #include "deform/v1/model.pb.h"
 
 namespace deform {
 
-// Takes what DownloadModel answers, in order. Memory grows as bytes come. What
-// cannot be is InvalidArgument BAD_ANSWER. Not thread-safe.
+// Takes what DownloadModel answers, in order. What cannot be is InvalidArgument
+// BAD_ANSWER. Not thread-safe.
 class ModelDownload {
  public:
   absl::Status Add(const v1::DownloadModelResponse& part);
 
   // Bytes, so far and at the end.
-  int64_t received() const { return static_cast<int64_t>(bytes_.size()); }
-  int64_t total() const { return total_; }
+  int64_t received() const { return bytes_.received(); }
+  int64_t total() const { return bytes_.total(); }
 
   absl::StatusOr<ModelArrays> Finish() &&;
 
@@ -29,8 +29,7 @@ class ModelDownload {
 
   std::optional<v1::Model> model_;
   int64_t position_bytes_ = 0;
-  int64_t total_ = 0;
-  std::string bytes_;
+  ChunkedBytes bytes_{"model", 0};
 };
 
 }  // namespace deform

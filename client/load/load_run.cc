@@ -134,7 +134,9 @@ class Run {
     int64_t number = 0;
     for (const auto& session : sessions_) {
       DeformOptions editing = options_.frames;
-      editing.weights = TargetOf(number++).weights;
+      const LoadTarget& target = TargetOf(number++);
+      editing.weights = target.weights;
+      editing.basis = target.basis;
       DeformOptions viewing = editing;
       viewing.max_fps = options_.viewer_fps;
       for (int p = 0; p < session->participants(); ++p) {

@@ -47,7 +47,9 @@ struct LoadTarget {
   int64_t point_count = 0;
   std::shared_ptr<const PosePattern> pattern;
   std::shared_ptr<const FrameJudge> judge;  // Null: frames are not checked.
-  HeldBinding weights = {};  // That participants hold; may be none.
+  // That participants hold; may be none.
+  HeldBinding weights = {};
+  HeldBasis basis = {};
 };
 
 // A part of the run as it goes on.

@@ -7,6 +7,7 @@
   X(Float32)                \
   X(Quantized16)            \
   X(Predicted)              \
+  X(Basis)                  \
   X(Pose)
 
 namespace deform {

@@ -36,6 +36,8 @@
 namespace deform {
 
 class Deformer;
+class LeafBasis;
+class ThreadPool;
 struct Pose;
 
 // Chunks of a frame hold at most this many bytes.
@@ -59,6 +61,10 @@ struct ChunkSource {
   // is its reference, of the same rig; null in a keyframe.
   const Deformer* deformer = nullptr;
   const Pose* reference_pose = nullptr;
+  // That of the deformer's binding; null if its weights are dense.
+  const LeafBasis* basis = nullptr;
+  // Borrowed, for those that write the frame as one chunk; may be null.
+  ThreadPool* pool = nullptr;
 };
 
 // Where a chunk is decoded to. As above; grids of another size than the frame's
@@ -75,6 +81,10 @@ struct ChunkTarget {
   // `error_bound` (may be null) is what DeformReport says.
   Deformer* deformer = nullptr;
   const Pose* reference_pose = nullptr;
+  // That of the receiver, of as many points as the frame; null if it holds none
+  // that the frame is of. Positions are then relative to `origin`, too.
+  const LeafBasis* basis = nullptr;
+  ThreadPool* pool = nullptr;  // Borrowed; may be null.
   Vec3 origin = Vec3::Zero();
   double* error_bound = nullptr;
 };
@@ -83,6 +93,7 @@ struct ChunkTarget {
 enum class Needs {
   kNothing,
   kWeights,  // Of the binding.
+  kBasis,    // The LeafBasis of these, as they are compressed.
 };
 
 class FrameEncoding {

@@ -62,6 +62,17 @@ ContentHash& ContentHash::Add(std::span<const double> numbers) {
   return *this;
 }
 
+ContentHash& ContentHash::AddParts(
+    std::span<const std::span<const std::byte>> parts) {
+  uint64_t length = 0;
+  for (const auto& part : parts) length += part.size();
+  EVP_DigestUpdate(context_, &length, sizeof(length));
+  for (const auto& part : parts) {
+    EVP_DigestUpdate(context_, part.data(), part.size());
+  }
+  return *this;
+}
+
 void ContentHash::AddBytes(const void* data, size_t size) {
   const uint64_t length = size;
   EVP_DigestUpdate(context_, &length, sizeof(length));

@@ -1,6 +1,7 @@
 // Names that follow from content: equal content, equal name.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -31,6 +32,8 @@ class ContentHash {
   ContentHash& Add(std::span<const int32_t> numbers);
   ContentHash& Add(std::span<const int64_t> numbers);
   ContentHash& Add(std::span<const double> numbers);
+  // One value in parts, however it is cut.
+  ContentHash& AddParts(std::span<const std::span<const std::byte>> parts);
 
   // The first 160 bits as 40 hexadecimal digits: no two contents share them by
   // chance or by effort. Ends the sequence.

@@ -41,6 +41,9 @@ class BindingService final : public v1::BindingService::Service {
   grpc::Status GetWeights(
       grpc::ServerContext* context, const v1::GetWeightsRequest* request,
       grpc::ServerWriter<v1::GetWeightsResponse>* writer) override;
+  grpc::Status DownloadBasis(
+      grpc::ServerContext* context, const v1::DownloadBasisRequest* request,
+      grpc::ServerWriter<v1::DownloadBasisResponse>* writer) override;
   grpc::Status GetQuality(
       grpc::ServerContext* context, const v1::GetQualityRequest* request,
       grpc::ServerWriter<v1::GetQualityResponse>* writer) override;

@@ -44,7 +44,10 @@ absl::StatusOr<WeightsId> FromProto(const v1::HeldWeights& held) {
   if (!held.binding_id().empty()) {
     DEFORM_RETURN_IF_ERROR(CheckName(held.binding_id(), "held.binding_id"));
   }
-  return WeightsId{.binding = held.binding_id()};
+  if (!held.basis_id().empty()) {
+    DEFORM_RETURN_IF_ERROR(CheckName(held.basis_id(), "held.basis_id"));
+  }
+  return WeightsId{.binding = held.binding_id(), .basis = held.basis_id()};
 }
 
 absl::StatusOr<JoinRequest> FromProto(const v1::Join& join) {

@@ -49,6 +49,7 @@ v1::FrameChunk ChunkHeader(const FrameToSend& send, size_t index,
       header.add_origin(frame.info.origin[c]);
     }
   }
+  if (send.tells_basis) header.set_basis_id(frame.info.basis_id);
   header.set_durable_revision(durable_revision);
   header.set_skipped_revisions(send.skipped_revisions);
   header.set_columns_applied(Clamped(frame.info.columns_applied));

@@ -66,6 +66,11 @@ void Audience::Hold(int64_t seat, WeightsId weights) {
 }
 
 void Audience::SetWeights(WeightsId weights) {
+  if (weights.basis != weights_.basis) {
+    std::erase_if(frames_, [](const auto& frame) {
+      return frame.first.format.encoding->needs() == Needs::kBasis;
+    });
+  }
   weights_ = std::move(weights);
   for (auto& [number, seat] : seats_) seat.PickFormat(weights_);
 }

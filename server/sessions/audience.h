@@ -69,7 +69,7 @@ class Audience {
   void WantKeyframe(int64_t seat);
   // The weights that its receiver has from now on.
   void Hold(int64_t seat, WeightsId weights);
-  // Those of the revision that is published next, and of those after it.
+  // Those of frames that are published from now on.
   void SetWeights(WeightsId weights);
 
   // Everybody has room for the frame of a next revision.

@@ -30,6 +30,9 @@ struct FrameInfo {
   // How far compressed weights may have moved any point, in model units.
   double weight_error = 0;
   std::chrono::microseconds deform_time{0};
+  // Of the weights that deformed it (NamedBasis); empty if they are dense, or
+  // nobody has wanted frames of it.
+  std::string basis_id;
 };
 
 // How a receiver has its frames.
@@ -56,6 +59,7 @@ struct HeldRevision {
 // Which weights there are.
 struct WeightsId {
   std::string binding;  // Empty: none.
+  std::string basis;    // NamedBasis::id, likewise.
 
   // Who holds these can read frames of this encoding of a session that has
   // `present`.
@@ -65,6 +69,8 @@ struct WeightsId {
         return true;
       case Needs::kWeights:
         return !binding.empty() && binding == present.binding;
+      case Needs::kBasis:
+        return !basis.empty() && basis == present.basis;
     }
     return false;
   }

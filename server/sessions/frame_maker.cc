@@ -173,8 +173,11 @@ absl::StatusOr<std::shared_ptr<const Frame>> FrameMaker::Encode(
     frame->held = PoseOf(deformer, info);
   }
   if (key.reference) frame->reference_revision = key.reference->revision;
-  ChunkSource source{
-      .dimension = frame->dimension, .tolerance = share, .deformer = &deformer};
+  ChunkSource source{.dimension = frame->dimension,
+                     .tolerance = share,
+                     .deformer = &deformer,
+                     .basis = basis_ != nullptr ? basis_->basis.get() : nullptr,
+                     .pool = pool};
   if (frame->held) source.grid = frame->held->grid();
   if (key.reference) {
     source.reference = key.reference->grid();

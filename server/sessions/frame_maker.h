@@ -11,7 +11,7 @@
 #include "core/base/thread_pool.h"
 #include "core/deform/deformer.h"
 #include "server/sessions/frame.h"
-#include "server/sessions/model_tables.h"
+#include "server/sessions/frame_tables.h"
 
 namespace deform::server {
 
@@ -21,8 +21,13 @@ using Frames = std::map<FrameKey, std::shared_ptr<const Frame>>;
 // the present revision share.
 class FrameMaker {
  public:
-  explicit FrameMaker(std::shared_ptr<ModelTables> tables)
+  explicit FrameMaker(std::shared_ptr<FrameTables> tables)
       : tables_(std::move(tables)) {}
+
+  // That of the deformers which come from now on; null: of dense weights.
+  void SetBasis(std::shared_ptr<const NamedBasis> basis) {
+    basis_ = std::move(basis);
+  }
 
   // Encodes where `deformer` is, for every key, chunks in parallel on `pool`
   // (may be null). Where an encoding cannot keep its tolerance the frame is
@@ -57,9 +62,10 @@ class FrameMaker {
                                                       const FrameKey& key,
                                                       ThreadPool* pool);
 
-  const std::shared_ptr<ModelTables> tables_;
+  const std::shared_ptr<FrameTables> tables_;
   std::shared_ptr<const PointOrder> order_;  // Once a grid was wanted.
   std::shared_ptr<const VertexFans> fans_;   // Once normals were.
+  std::shared_ptr<const NamedBasis> basis_;
   uint64_t revision_ = 0;
   // Of the revision: all points relative to the origin, once normals were
   // wanted (encodings then take them from here, too), and what was made.

@@ -110,6 +110,12 @@ absl::StatusOr<FrameFormat> PickFormat(
 
 }  // namespace
 
+bool FrameWishes::TakesBasis() const {
+  return std::any_of(
+      encodings.begin(), encodings.end(),
+      [](const auto* encoding) { return encoding->needs() == Needs::kBasis; });
+}
+
 absl::StatusOr<FrameFormats> PickFormats(const FrameWishes& wishes,
                                          const Rig& rig) {
   const double diagonal = DiagonalOf(rig);

@@ -27,6 +27,8 @@ struct FrameWishes {
   double max_fps = 0;
   bool normals = false;
   WeightsId weights;  // That it has.
+
+  bool TakesBasis() const;  // Frames that need one.
 };
 
 // What it gets.

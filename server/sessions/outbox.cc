@@ -97,10 +97,12 @@ FrameToSend Outbox::TakeFrame() {
     send.skipped_revisions = info.revision - revision_ - 1;
   }
   send.tells_origin = !sent_any_ || info.origin_number != origin_number_;
+  send.tells_basis = info.basis_id != basis_id_;
   sent_any_ = true;
   answered_ = waiting.answers;
   revision_ = info.revision;
   origin_number_ = info.origin_number;
+  basis_id_ = info.basis_id;
   return send;
 }
 

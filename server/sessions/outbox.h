@@ -5,6 +5,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -31,6 +32,7 @@ struct FrameToSend {
   uint64_t answers_sequence = 0;
   uint64_t skipped_revisions = 0;
   bool tells_origin = false;
+  bool tells_basis = false;
 };
 // Comes before the first frame on a grid.
 struct OrderToSend {
@@ -137,6 +139,7 @@ class Outbox {
   uint64_t answered_ = 0;
   uint64_t revision_ = 0;
   uint64_t origin_number_ = 0;
+  std::string basis_id_;
   bool sent_any_ = false;
   bool sent_order_ = false;
   bool goes_on_ = false;

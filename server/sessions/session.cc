@@ -43,7 +43,7 @@ Session::Session(StoredStart start, BindingInUse use,
       dimension_(use.lease.record()->facts.dimension()),
       create_time_(start.create_time),
       environment_(environment),
-      frame_maker_(environment.model_tables),
+      frame_maker_(environment.frame_tables),
       memory_(std::move(memory)),
       lease_(std::move(use.lease)),
       binding_id_(lease_.record()->id),
@@ -65,6 +65,27 @@ Session::Session(StoredStart start, BindingInUse use,
   info_.origin_number = 1;
   MutexLock lock(mutex_);
   audience_.SetWeights({.binding = binding_id_});
+}
+
+void Session::ProvideBasis() {
+  std::shared_ptr<const Binding> weights;
+  {
+    MutexLock lock(mutex_);
+    if (!wants_basis_ || basis_ != nullptr || weights_ == nullptr) return;
+    weights = weights_;
+  }
+  auto basis = environment_.frame_tables->BasisOf(weights);
+  if (basis == nullptr) return;
+  MutexLock lock(mutex_);
+  if (weights_ == weights) SetWeights(std::move(weights), std::move(basis));
+}
+
+void Session::SetWeights(std::shared_ptr<const Binding> weights,
+                         std::shared_ptr<const NamedBasis> basis) {
+  weights_ = std::move(weights);
+  basis_ = std::move(basis);
+  audience_.SetWeights(
+      {.binding = binding_id_, .basis = basis_ != nullptr ? basis_->id : ""});
 }
 
 int64_t Session::BytesFor(const BindingFacts& binding) {
@@ -182,6 +203,7 @@ Session::Step Session::BeginStep() {
   MutexLock lock(mutex_);
   const auto now = environment_.clock();
   step.binding_id = binding_id_;
+  step.basis = basis_;
   // Who has joined sees the state as it was before anything newer.
   if (!audience_.MustSeeThis(now)) {
     if (refreshed_ != nullptr) {
@@ -195,8 +217,8 @@ Session::Step Session::BeginStep() {
   }
   const bool by_all = step.move || step.pose;
   step.wanted = audience_.Wanted(by_all, now);
-  // Nobody has the weights yet that the session moves to.
-  if (step.move) {
+  // Nobody has the weights yet that the session changes over to.
+  if (step.move || step.refreshed != nullptr) {
     std::erase_if(step.wanted, [](const FrameKey& key) {
       return key.format.encoding->needs() != Needs::kNothing;
     });
@@ -210,6 +232,9 @@ void Session::FinishStep(Step step, ThreadPool* pool) {
   if (step.move) moved = ChangeRig(step, pool);
   if (step.refreshed != nullptr) ChangeForm(step, pool);
   if (step.pose) Describe(step.pose->pose, step.report, step.deform_time);
+  info_.basis_id = step.basis != nullptr ? step.basis->id : "";
+  frame_maker_.SetBasis(step.basis);
+  ProvideBasis();
   std::shared_ptr<const FrameNormals> normals;
   if (step.wants_normals)
     normals = frame_maker_.Normals(*deformer_, info_, pool);
@@ -264,6 +289,7 @@ absl::Status Session::ChangeRig(Step& step, ThreadPool* pool) {
   DeformJob job{.deformer = next.get(), .pose = &transfer.pose()};
   MoveTogether({&job, 1}, pool);
   const auto before = std::exchange(deformer_, std::move(next));
+  step.basis.reset();
   Describe(transfer.pose(), job.report,
            std::chrono::duration_cast<std::chrono::microseconds>(
                std::chrono::steady_clock::now() - begin));
@@ -287,9 +313,11 @@ void Session::ChangeForm(Step& step, ThreadPool* pool) {
   deformer_ = std::move(next);
   // The revision's frames may come from either form.
   info_.weight_error = std::max(info_.weight_error, job.report.error_bound);
+  step.basis.reset();
   // The former weights go with the step, not under the lock.
   MutexLock lock(mutex_);
-  weights_.swap(step.refreshed);
+  auto former = weights_;
+  SetWeights(std::exchange(step.refreshed, std::move(former)));
 }
 
 Session::Receivers Session::Publish(
@@ -322,11 +350,10 @@ void Session::PublishChange(Step& step) {
   if (!closed_) lease_ = std::move(step.move->to.lease);
   memory_ = std::move(step.move->memory);
   binding_id_ = step.change->binding_id;
-  weights_ = std::move(step.move->to.binding);
+  SetWeights(std::move(step.move->to.binding));
   rig_history_.Add(step.change);
   roster_.Transfer(step.change->transfer, environment_.clock());
   audience_.Announce(step.change);
-  audience_.SetWeights({.binding = binding_id_});
 }
 
 }  // namespace deform::server

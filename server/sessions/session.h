@@ -24,8 +24,8 @@
 #include "server/sessions/batch_scheduler.h"
 #include "server/sessions/frame.h"
 #include "server/sessions/frame_maker.h"
+#include "server/sessions/frame_tables.h"
 #include "server/sessions/frame_wishes.h"
-#include "server/sessions/model_tables.h"
 #include "server/sessions/outbox.h"
 #include "server/sessions/participant.h"
 #include "server/sessions/pose_queue.h"
@@ -56,7 +56,7 @@ struct SessionEnvironment {
   std::function<void(std::chrono::steady_clock::time_point,
                      std::function<void()>)>
       call_at = {};
-  std::shared_ptr<ModelTables> model_tables = std::make_shared<ModelTables>();
+  std::shared_ptr<FrameTables> frame_tables = std::make_shared<FrameTables>();
   JournalReport report = {};  // May be empty.
   // What the manager adds. The store of all sessions; null: they are not kept.
   Store* store = nullptr;
@@ -171,8 +171,10 @@ class Session : public std::enable_shared_from_this<Session> {
     std::optional<RigMove> move;
     std::shared_ptr<const Binding> refreshed;
     std::shared_ptr<const RigChange> change;  // What the move made.
-    std::string binding_id;                   // Before it.
-    std::vector<FrameKey> wanted;             // Frames to be made.
+    // Of the weights that the deformer has; null: see Session::basis_.
+    std::shared_ptr<const NamedBasis> basis;
+    std::string binding_id;        // Before it.
+    std::vector<FrameKey> wanted;  // Frames to be made.
     bool wants_normals = false;
     Deformer* deformer = nullptr;
     // Once the deformer has moved to the pose.
@@ -235,6 +237,14 @@ class Session : public std::enable_shared_from_this<Session> {
   void Complete(Outgoing& outgoing) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   static void Wake(const Receivers& receivers);
 
+  // Makes the basis of the present weights, if it is wanted and not there:
+  // takes time. Each step sees to that, for the next.
+  void ProvideBasis() ABSL_LOCKS_EXCLUDED(mutex_);
+  // The weights of the frames that come next.
+  void SetWeights(std::shared_ptr<const Binding> weights,
+                  std::shared_ptr<const NamedBasis> basis = nullptr)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+
   absl::Status ChangeRig(Step& step, ThreadPool* pool);
   void ChangeForm(Step& step, ThreadPool* pool);
   void Describe(const Pose& pose, const DeformReport& report,
@@ -267,6 +277,10 @@ class Session : public std::enable_shared_from_this<Session> {
   // Null while it is asleep.
   std::shared_ptr<const Binding> weights_ ABSL_GUARDED_BY(mutex_);
   bool waking_ ABSL_GUARDED_BY(mutex_) = false;
+  // Of the weights; null: they are dense, nobody has wanted it, or not yet.
+  std::shared_ptr<const NamedBasis> basis_ ABSL_GUARDED_BY(mutex_);
+  // Somebody has joined who takes frames of it.
+  bool wants_basis_ ABSL_GUARDED_BY(mutex_) = false;
   // The same weights in another form, to be changed over to.
   std::shared_ptr<const Binding> refreshed_ ABSL_GUARDED_BY(mutex_);
   std::deque<RigMove> moves_ ABSL_GUARDED_BY(mutex_);

@@ -78,6 +78,7 @@ class SessionManager {
 
   SessionCatalogue& catalogue() { return sessions_; }
   const Clock& clock() const { return environment_.clock; }
+  FrameTables& frame_tables() { return *environment_.frame_tables; }
 
  private:
   Store& store() { return bindings_.store(); }

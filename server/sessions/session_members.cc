@@ -14,6 +14,13 @@ absl::StatusOr<Session::Joined> Session::Join(Delivery delivery,
                                               const FrameWishes& wishes,
                                               std::weak_ptr<Receiver> receiver,
                                               const Introduction& who) {
+  if (wishes.TakesBasis()) {
+    {
+      MutexLock lock(mutex_);
+      wants_basis_ = true;
+    }
+    ProvideBasis();
+  }
   const auto now = environment_.clock();
   Receivers to_wake;
   const auto join = [&]() -> absl::StatusOr<Joined> {

@@ -53,7 +53,7 @@ void Session::WakeUp(FindWeights find_weights) {
     MutexLock lock(mutex_);
     waking_ = false;
     if (binding.ok()) {
-      weights_ = *binding;
+      SetWeights(*binding);
       Schedule();
       return;
     }

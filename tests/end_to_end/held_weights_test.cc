@@ -166,7 +166,7 @@ TEST_F(HeldWeightsTest, WeightsOfAnotherModelAreRefused) {
   const auto refused = client().Deform(session_, {.weights = weights});
   EXPECT_EQ(DetailOf(refused.status()).reason, "OTHER_MODEL");
   EXPECT_THAT(std::string(refused.status().message()),
-              HasSubstr("these weights are of a model with 42 points in 3D, "
+              HasSubstr("this binding is of a model with 42 points in 3D, "
                         "the session's has 162 in 3D"));
 }
 

@@ -2,7 +2,9 @@
 // that the numbers add up, not how fast anything is.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <algorithm>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <thread>
@@ -26,9 +28,12 @@ using testing::Not;
 // Half a second of a few small sessions, each looked at often.
 std::vector<std::string> ShortLoad(const std::string& address,
                                    std::vector<std::string> more = {}) {
-  std::vector<std::string> arguments = {
-      "--server", address,    "load", "--duration", "400ms", "--warm-up",
-      "100ms",    "--points", "200",  "--check",    "50ms"};
+  std::vector<std::string> arguments = {"--server",   address,   "load",
+                                        "--duration", "400ms",   "--warm-up",
+                                        "100ms",      "--check", "50ms"};
+  if (std::find(more.begin(), more.end(), "--points") == more.end()) {
+    arguments.insert(arguments.end(), {"--points", "200"});
+  }
   arguments.insert(arguments.end(), more.begin(), more.end());
   return arguments;
 }
@@ -154,7 +159,11 @@ INSTANTIATE_TEST_SUITE_P(
          {"EditorsAndViewers",
           {"--editors", "2", "--viewers", "3", "--pattern", "whole"}},
          {"Encoding", {"--encoding", "float32"}},
-         {"Poses", {"--encoding", "pose", "--models", "2"}}}),
+         {"Poses", {"--encoding", "pose", "--models", "2"}},
+         // As many points as are worth compressing.
+         {"Bases",
+          {"--encoding", "basis", "--frame-tolerance", "1e-4", "--points",
+           "20000"}}}),
     [](const auto& test) { return test.param.name; });
 
 TEST_F(Load, PosesABindingThatIsThereAndLeavesIt) {

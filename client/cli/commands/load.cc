@@ -78,7 +78,8 @@ absl::Status Complete(Options& options) {
   }
   load.frames.normals = options.normals;
   options.stage.frame_tolerance = options.frames.tolerance;
-  options.stage.hold_weights = options.frames.NeedsWeights();
+  options.stage.hold_weights = options.frames.Need(Needs::kWeights);
+  options.stage.hold_basis = options.frames.Need(Needs::kBasis);
   options.stage.check = load.check_interval.count() > 0;
   options.stage.editors = load.editors;
   options.stage.rate = load.rate;

@@ -172,13 +172,8 @@ absl::Status Run(const Options& options, Context& context) {
                           Stage::Open(context, options.stage));
   DEFORM_ASSIGN_OR_RETURN(const Script script,
                           Script::Create(options, stage->rig(), *stage));
-  if (options.format.NeedsWeights()) {
-    Progress downloading(context.console, "downloading weights",
-                         &context.interruption);
-    DEFORM_ASSIGN_OR_RETURN(frames.weights, stage->client().DownloadBinding(
-                                                stage->binding().binding_id,
-                                                downloading.callback()));
-  }
+  DEFORM_RETURN_IF_ERROR(options.format.Download(
+      stage->client(), stage->binding().binding_id, context, frames));
   DEFORM_ASSIGN_OR_RETURN(
       DeformStream stream,
       stage->client().Deform(stage->session().session_id, frames));

@@ -89,7 +89,7 @@ TEST(ModelDownload, RefusesWhatCannotBe) {
               HasSubstr("the chunk at 0 has another checksum than it tells"));
   EXPECT_THAT(Refusal({Header(2, 1, 0), Chunk(0, "12345678")}),
               HasSubstr("a model ends after 8 of 16 bytes"));
-  EXPECT_THAT(Refusal({}), HasSubstr("a model ends after 0 of 0 bytes"));
+  EXPECT_THAT(Refusal({}), HasSubstr("the server sent no model"));
 }
 
 }  // namespace

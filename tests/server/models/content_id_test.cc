@@ -20,6 +20,17 @@ TEST(ContentHash, DoesNotLetValuesRunTogether) {
             ContentHash("k").Add("a").Add("bc").Finish());
 }
 
+TEST(ContentHash, TakesAValueInPartsHoweverItIsCut) {
+  const std::string text = "abcdef";
+  const auto bytes = std::as_bytes(std::span(text));
+  const std::span<const std::byte> whole[] = {bytes};
+  const std::span<const std::byte> parts[] = {
+      bytes.first(1), bytes.subspan(1, 3), bytes.subspan(4)};
+  const std::string id = ContentHash("k").Add(text).Finish();
+  EXPECT_EQ(ContentHash("k").AddParts(whole).Finish(), id);
+  EXPECT_EQ(ContentHash("k").AddParts(parts).Finish(), id);
+}
+
 TEST(ContentHash, SeesEveryNumber) {
   Positions a = Positions::Zero(2, 3);
   Positions b = a;

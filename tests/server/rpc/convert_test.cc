@@ -313,6 +313,34 @@ TEST(ConvertJoin, KeepsHowManyFramesAreWanted) {
   EXPECT_TRUE(FromProto(join)->frames.normals);
 }
 
+TEST(ConvertJoin, KeepsWhatTheClientHolds) {
+  v1::Join join;
+  join.set_session_id("s");
+  join.mutable_held()->set_binding_id("b-1");
+  join.mutable_held()->set_basis_id("ab12");
+  EXPECT_EQ(FromProto(join)->frames.weights.binding, "b-1");
+  EXPECT_EQ(FromProto(join)->frames.weights.basis, "ab12");
+  EXPECT_FALSE(FromProto(join)->frames.TakesBasis());
+  join.add_encodings("float32");
+  join.add_encodings("basis");
+  EXPECT_TRUE(FromProto(join)->frames.TakesBasis());
+}
+
+TEST(ConvertJoin, RefusesHeldWeightsThatCannotBe) {
+  v1::Join join;
+  join.set_session_id("s");
+  join.mutable_held()->set_binding_id("no such name");
+  absl::Status status = FromProto(join).status();
+  EXPECT_EQ(DetailOf(status).reason, "BAD_NAME");
+  EXPECT_EQ(DetailOf(status).field, "held.binding_id");
+  EXPECT_THAT(std::string(status.message()), HasSubstr("held.binding_id"));
+  join.mutable_held()->set_binding_id("b-1");
+  join.mutable_held()->set_basis_id(std::string(200, 'a'));
+  status = FromProto(join).status();
+  EXPECT_EQ(DetailOf(status).reason, "BAD_NAME");
+  EXPECT_EQ(DetailOf(status).field, "held.basis_id");
+}
+
 TEST(ConvertJoin, RefusesWhatItDoesNotKnow) {
   v1::Join join;
   EXPECT_EQ(DetailOf(FromProto(join).status()).field, "session_id");
@@ -322,7 +350,7 @@ TEST(ConvertJoin, RefusesWhatItDoesNotKnow) {
   EXPECT_EQ(DetailOf(status).reason, "UNKNOWN_ENCODING");
   EXPECT_EQ(status.message(),
             "none of the encodings is known; known: float32, quantized16, "
-            "predicted, pose");
+            "predicted, basis, pose");
   join.set_delivery(static_cast<v1::Delivery>(5));
   status = FromProto(join).status();
   EXPECT_EQ(status.message(), "delivery 5 is not known");

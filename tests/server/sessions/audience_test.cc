@@ -3,94 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/server/sessions/audience_fixture.h"
+
 namespace deform::server {
 namespace {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::SizeIs;
-
-class AudienceTest : public testing::Test {
- protected:
-  int64_t Add(Delivery delivery = Delivery::kLatest) {
-    return audience_.Add({.delivery = delivery, .format = float32_}, {}, now_);
-  }
-  // At most ten frames a second.
-  int64_t AddLimited(const FrameFormat& format) {
-    return audience_.Add(
-        {.format = format, .interval = std::chrono::milliseconds(100)}, {},
-        now_);
-  }
-  void Pass(int milliseconds) {
-    now_ += std::chrono::milliseconds(milliseconds);
-  }
-  int64_t AddOnGrid(Delivery delivery = Delivery::kLatest) {
-    return audience_.Add({.delivery = delivery, .format = predicted_}, {},
-                         now_);
-  }
-  // Takes poses, as long as it holds the weights.
-  int64_t AddForPoses(const WeightsId& weights,
-                      Delivery delivery = Delivery::kLatest) {
-    return audience_.Add({.delivery = delivery,
-                          .format = pose_,
-                          .otherwise = predicted_,
-                          .weights = weights},
-                         {}, now_);
-  }
-  // Makes what is wanted of the revision.
-  Frames Made(uint64_t revision, const std::vector<FrameKey>& keys) {
-    Frames frames;
-    std::shared_ptr<const HeldRevision> grid, pose;
-    for (const FrameKey& key : keys) {
-      auto frame = std::make_shared<Frame>();
-      frame->info.revision = revision;
-      if (key.format.encoding->uses_grid()) {
-        if (grid == nullptr) {
-          grid = std::make_shared<const HeldRevision>(
-              HeldRevision{.revision = revision, .content = Grid(1)});
-        }
-        frame->held = grid;
-      } else if (key.format.encoding->refers()) {
-        if (pose == nullptr) {
-          pose = std::make_shared<const HeldRevision>(
-              HeldRevision{.revision = revision, .content = Pose()});
-        }
-        frame->held = pose;
-      }
-      frame->encoding = key.format.encoding;
-      if (key.reference) {
-        frame->reference_revision = key.reference->revision;
-      }
-      frames[key] = std::move(frame);
-    }
-    return frames;
-  }
-  void Publish(uint64_t revision) {
-    audience_.Publish(revision, Made(revision, audience_.Wanted(true, now_)),
-                      now_);
-  }
-  // Frames of the revision for those who lack one.
-  void Serve(uint64_t revision) {
-    audience_.Publish(revision, Made(revision, audience_.Wanted(false, now_)),
-                      now_);
-  }
-  FrameToSend TakeFrame(int64_t seat) {
-    return std::get<FrameToSend>(audience_.Take(seat, now_).value());
-  }
-  // It has been sent.
-  void TakeNothing(int64_t seat) {
-    EXPECT_FALSE(audience_.Take(seat, now_).has_value());
-  }
-
-  const FrameFormat float32_{.encoding = FindEncoding("float32")};
-  const FrameFormat quantized16_{.encoding = FindEncoding("quantized16"),
-                                 .tolerance = 0.1};
-  const FrameFormat predicted_{.encoding = FindEncoding("predicted"),
-                               .tolerance = 0.1};
-  const FrameFormat pose_{.encoding = FindEncoding("pose")};
-  Audience audience_;
-  Audience::TimePoint now_{};
-};
 
 TEST_F(AudienceTest, GivesWhoComesFirstNothingUntilThereIsAFrame) {
   const int64_t seat = Add();
@@ -378,67 +298,6 @@ TEST_F(AudienceTest, AFrameOnAnotherRigOrOneThatEndsTheStreamDoesNotWait) {
   audience_.Find(seat)->Expect(1);
   audience_.EndWhenAnswered(absl::OkStatus());
   EXPECT_TRUE(audience_.NeedsFrame(now_));
-}
-
-TEST_F(AudienceTest, WhoHoldsTheWeightsGetsPoses) {
-  audience_.SetWeights({.binding = "a"});
-  const int64_t seat = AddForPoses({.binding = "a"});
-  Publish(1);
-  const FrameToSend first = TakeFrame(seat);
-  EXPECT_EQ(first.frame->encoding, pose_.encoding);
-  EXPECT_FALSE(first.frame->reference_revision.has_value());
-  TakeNothing(seat);
-  Publish(2);
-  EXPECT_EQ(TakeFrame(seat).frame->reference_revision, 1u);
-}
-
-TEST_F(AudienceTest, WhoDoesNotHoldThemGetsAnotherEncoding) {
-  audience_.SetWeights({.binding = "a"});
-  const int64_t seat = AddForPoses({});
-  Publish(1);
-  EXPECT_EQ(TakeFrame(seat).frame->encoding, predicted_.encoding);
-  TakeNothing(seat);
-  audience_.Hold(seat, {.binding = "other"});
-  Publish(2);
-  EXPECT_EQ(TakeFrame(seat).frame->encoding, predicted_.encoding);
-  TakeNothing(seat);
-  audience_.Hold(seat, {.binding = "a"});
-  Publish(3);
-  // A grid is no reference for a pose.
-  const FrameToSend pose = TakeFrame(seat);
-  EXPECT_EQ(pose.frame->encoding, pose_.encoding);
-  EXPECT_FALSE(pose.frame->reference_revision.has_value());
-}
-
-TEST_F(AudienceTest, PosesAreOfTheWeightsThatTheRevisionHas) {
-  audience_.SetWeights({.binding = "a"});
-  const int64_t seat = AddForPoses({.binding = "a"}, Delivery::kEvery);
-  Publish(1);
-  TakeFrame(seat);
-  TakeNothing(seat);
-  audience_.SetWeights({.binding = "b"});
-  Publish(2);
-  EXPECT_EQ(TakeFrame(seat).frame->encoding, predicted_.encoding);
-  TakeNothing(seat);
-  // What it holds of the former rig is no reference any more.
-  audience_.SetWeights({.binding = "a"});
-  audience_.Hold(seat, {.binding = "a"});
-  Publish(3);
-  EXPECT_FALSE(TakeFrame(seat).frame->reference_revision.has_value());
-}
-
-TEST_F(AudienceTest, AFrameIsMadeAnewIfTheWeightsChangedMeanwhile) {
-  audience_.SetWeights({.binding = "a"});
-  const int64_t seat = AddForPoses({.binding = "a"}, Delivery::kEvery);
-  Publish(1);
-  TakeFrame(seat);
-  const Frames made = Made(2, audience_.Wanted(true, now_));
-  audience_.SetWeights({.binding = "b"});
-  audience_.Publish(2, made, now_);
-  TakeNothing(seat);
-  EXPECT_TRUE(audience_.MustSeeThis(now_));
-  Serve(2);
-  EXPECT_EQ(TakeFrame(seat).frame->encoding, predicted_.encoding);
 }
 
 TEST_F(AudienceTest, HasRoomAsLongAsEverybodyHas) {

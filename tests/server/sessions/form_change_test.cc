@@ -133,6 +133,50 @@ TEST_F(FormChangeTest, AppliesMovedColumnsAloneInBothForms) {
             dense.frame->info.columns_applied);
 }
 
+TEST_F(FormChangeTest, TellsWhoTakesItOfTheBasis) {
+  FakeStream plain = Join(session_);
+  Posed(plain, 1, MoveVertex(7, {1.5, 1, 1}));
+  background_.RunAll();
+  EXPECT_EQ(Posed(plain, 2, MoveVertex(7, {1.5, 1.1, 1})).frame->info.basis_id,
+            "")
+      << "nobody wants it";
+
+  const FrameWishes wishes{.encodings = {FindEncoding("basis")},
+                           .tolerance = 1e-3};
+  FakeStream taker;
+  taker.participant = std::move(
+      session_->Join(Delivery::kEvery, wishes, taker.receiver)->participant);
+  compute_.RunAll();
+  EXPECT_EQ(taker.TakeFrame().frame->encoding->id(), "float32");
+  const FrameToSend told = Posed(plain, 3, MoveVertex(7, {1.5, 1.2, 1}));
+  const std::string id = told.frame->info.basis_id;
+  EXPECT_EQ(id, sessions_.frame_tables().BasisOf(record_->weights->Get())->id);
+  EXPECT_TRUE(told.tells_basis);
+  EXPECT_EQ(taker.TakeFrame().frame->encoding->id(), "float32");
+  taker.participant->Hold({.basis = id});
+  Posed(plain, 4, MoveVertex(7, {1.5, 1.3, 1}));
+  EXPECT_EQ(taker.TakeFrame().frame->encoding->id(), "basis");
+}
+
+TEST_F(FormChangeTest, FramesOfTheBasisBeginAfterTheFormHasChanged) {
+  const FrameWishes wishes{.encodings = {FindEncoding("basis")},
+                           .tolerance = 1e-3};
+  FakeStream taker;
+  taker.participant = std::move(
+      session_->Join(Delivery::kEvery, wishes, taker.receiver)->participant);
+  compute_.RunAll();
+  EXPECT_EQ(taker.TakeFrame().frame->info.basis_id, "");
+  background_.RunAll();
+  compute_.RunAll();
+  // Known from the binding already, before the session tells.
+  taker.participant->Hold(
+      {.basis = sessions_.frame_tables().BasisOf(record_->weights->Get())->id});
+  Posed(taker, 1, MoveVertex(7, {1.5, 1, 1}));
+  const FrameToSend frame = Posed(taker, 2, MoveVertex(7, {1.5, 1.1, 1}));
+  EXPECT_EQ(frame.frame->encoding->id(), "basis");
+  EXPECT_NE(frame.frame->info.basis_id, "");
+}
+
 TEST_F(FormChangeTest, LetsTheDenseWeightsGo) {
   FakeStream stream = Join(session_);
   const int64_t dense = record_->weights->state().bytes;

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 
 #include "core/frames/normals.h"
+#include "core/weights/compress_binding.h"
 #include "tests/server/sessions/support.h"
 
 namespace deform::server {
@@ -44,7 +45,7 @@ class FrameMakerTest : public testing::Test {
     return (decoded - deformer_.positions()).rowwise().norm().maxCoeff();
   }
 
-  FrameMaker maker_{std::make_shared<ModelTables>()};
+  FrameMaker maker_{std::make_shared<FrameTables>()};
   Deformer deformer_{BindBall(1), nullptr};
 };
 
@@ -90,6 +91,39 @@ TEST_F(FrameMakerTest, EveryEncodingKeepsItsTolerance) {
     EXPECT_LE(ErrorOf(FrameDecoder().Decode(*frame)), kTolerance)
         << encoding->id();
   }
+}
+
+TEST_F(FrameMakerTest, LeafCoefficientsAreOfTheBasisOrElseFloats) {
+  const FrameKey key = KeyOf("basis", kTolerance);
+  EXPECT_EQ(MakeOne(key, {})->encoding->id(), "float32");
+  const auto dense = BindBall(2);
+  const auto compressed =
+      CompressBinding(*dense, &dense->weights(), 1e-5, {}).value();
+  const Deformer deformer(compressed, nullptr);
+  const auto basis = FrameTables().BasisOf(compressed);
+  maker_.SetBasis(basis);
+  const FrameInfo info{.revision = 1, .basis_id = basis->id};
+  const auto frame = maker_.Make(deformer, info, {&key, 1}, nullptr).at(key);
+  EXPECT_EQ(frame->encoding->id(), "basis");
+  EXPECT_EQ(frame->held, nullptr);
+  EXPECT_EQ(frame->error_bound, kTolerance);
+  ASSERT_EQ(frame->chunks.size(), 1u);
+  const Frame::Chunk& chunk = frame->chunks[0];
+  std::vector<float> positions(3 * deformer.binding().point_count());
+  ASSERT_TRUE(frame->encoding
+                  ->Decode({chunk.bytes.get(), static_cast<size_t>(chunk.size)},
+                           {.count = chunk.vertex_count,
+                            .positions = positions,
+                            .basis = basis->basis.get()})
+                  .ok());
+  const Eigen::Map<
+      const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>>
+      decoded(positions.data(), chunk.vertex_count, 3);
+  EXPECT_LE((decoded.cast<double>() - deformer.positions())
+                .rowwise()
+                .norm()
+                .maxCoeff(),
+            kTolerance + 1e-6);
 }
 
 TEST_F(FrameMakerTest, PredictsFromWhatTheReceiverHolds) {
@@ -184,15 +218,33 @@ TEST_F(FrameMakerTest, FramesAreTheSameWithAndWithoutNormals) {
       return std::vector<uint8_t>(chunk.bytes.get(),
                                   chunk.bytes.get() + chunk.size);
     };
-    FrameMaker with(std::make_shared<ModelTables>());
+    FrameMaker with(std::make_shared<FrameTables>());
     with.Normals(deformer_, info, nullptr);
-    FrameMaker without(std::make_shared<ModelTables>());
+    FrameMaker without(std::make_shared<FrameTables>());
     EXPECT_EQ(chunk_of(with), chunk_of(without)) << encoding->id();
   }
 }
 
-TEST(ModelTables, AreKeptAsLongAsSomebodyHoldsThem) {
-  ModelTables tables;
+TEST(FrameTables, NameTheBasisOfCompressedWeights) {
+  FrameTables tables;
+  const auto dense = BindBall(1);
+  EXPECT_EQ(tables.BasisOf(dense), nullptr);
+  const auto compressed =
+      CompressBinding(*dense, &dense->weights(), 1e-3, {}).value();
+  const auto basis = tables.BasisOf(compressed);
+  EXPECT_EQ(basis->basis->point_count(), kBallPoints);
+  EXPECT_EQ(tables.BasisOf(compressed), basis);
+  // The name is that of the bytes.
+  const auto same =
+      CompressBinding(*dense, &dense->weights(), 1e-3, {}).value();
+  EXPECT_EQ(tables.BasisOf(same)->id, basis->id);
+  const auto finer =
+      CompressBinding(*dense, &dense->weights(), 1e-6, {}).value();
+  EXPECT_NE(tables.BasisOf(finer)->id, basis->id);
+}
+
+TEST(FrameTables, AreKeptAsLongAsSomebodyHoldsThem) {
+  FrameTables tables;
   const auto ball = std::make_shared<const Mesh>(MeshOf(Icosphere(0.5, 1)));
   const auto other = std::make_shared<const Mesh>(MeshOf(Icosphere(0.5, 2)));
   const auto order = tables.OrderOf(ball);

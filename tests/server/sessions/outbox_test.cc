@@ -95,6 +95,21 @@ TEST(Outbox, TellsAnOriginOnce) {
   EXPECT_FALSE(TakeFrame(outbox).tells_origin);
 }
 
+TEST(Outbox, TellsABasisWhenItIsAnother) {
+  Outbox outbox(Delivery::kEvery);
+  const auto offer = [&](const std::string& basis_id) {
+    auto frame = std::make_shared<Frame>();
+    frame->info.basis_id = basis_id;
+    outbox.Offer(std::move(frame), 0);
+    return TakeFrame(outbox).tells_basis;
+  };
+  EXPECT_FALSE(offer(""));
+  EXPECT_TRUE(offer("a"));
+  EXPECT_FALSE(offer("a"));
+  EXPECT_TRUE(offer("b"));
+  EXPECT_TRUE(offer(""));
+}
+
 TEST(Outbox, TellsTheOriginAlsoWhenItsFirstFrameWasSkipped) {
   Outbox outbox(Delivery::kLatest);
   outbox.Offer(FrameOf(0, 1), 0);

@@ -2,81 +2,29 @@
 // DEFORM_BINARY_DIR.
 #pragma once
 
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "tests/support/child_process.h"
+
 namespace deform {
 
-// Runs deformd; its output can be read. Kills what still runs at the end.
-class Process {
+// Runs deformd.
+class Process : public ChildProcess {
  public:
-  explicit Process(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), DEFORM_BINARY_DIR "/bin/deformd");
-    int out[2];
-    int err[2];
-    if (pipe2(out, O_CLOEXEC) != 0 || pipe2(err, O_CLOEXEC) != 0) abort();
-    pid_ = fork();
-    if (pid_ == 0) {
-      dup2(out[1], STDOUT_FILENO);
-      dup2(err[1], STDERR_FILENO);
-      std::vector<char*> argv;
-      for (std::string& argument : arguments) argv.push_back(argument.data());
-      argv.push_back(nullptr);
-      execv(argv[0], argv.data());
-      _exit(127);
-    }
-    close(out[1]);
-    close(err[1]);
-    out_ = fdopen(out[0], "r");
-    err_ = fdopen(err[0], "r");
-  }
-  ~Process() {
-    if (pid_ > 0) {
-      kill(pid_, SIGKILL);
-      waitpid(pid_, nullptr, 0);
-    }
-    fclose(out_);
-    fclose(err_);
-  }
-  Process(const Process&) = delete;
-  Process& operator=(const Process&) = delete;
-
-  std::string ReadLine() {
-    char line[1000] = "";
-    if (fgets(line, sizeof(line), out_) == nullptr) return "";
-    return line;
-  }
-  std::string ReadAll() { return ReadAll(out_); }
-  std::string ReadErrors() { return ReadAll(err_); }
-  void Signal(int number) { kill(pid_, number); }
-  // 128 + the signal if one ended it.
-  int Wait() {
-    int status = 0;
-    waitpid(pid_, &status, 0);
-    pid_ = -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  }
+  explicit Process(std::vector<std::string> arguments)
+      : ChildProcess(WithProgram(std::move(arguments))) {}
 
  private:
-  static std::string ReadAll(FILE* file) {
-    std::string all;
-    for (int c; (c = fgetc(file)) != EOF;) all += static_cast<char>(c);
-    return all;
+  static std::vector<std::string> WithProgram(
+      std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), DEFORM_BINARY_DIR "/bin/deformd");
+    return arguments;
   }
-
-  pid_t pid_ = -1;
-  FILE* out_ = nullptr;
-  FILE* err_ = nullptr;
 };
 
 // A deformd that listens; it keeps nothing, unless `more` says so.

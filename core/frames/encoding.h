@@ -105,6 +105,8 @@ class FrameEncoding {
 
   // Gives back the very floats it was given: needs no tolerance.
   virtual bool is_exact() const { return false; }
+  // Writes the positions as they lie in memory: they may be where it writes.
+  virtual bool is_verbatim() const { return false; }
   virtual bool uses_grid() const { return false; }
   virtual Needs needs() const { return Needs::kNothing; }
   // A frame may have a reference.

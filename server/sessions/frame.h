@@ -16,6 +16,7 @@
 #include "core/frames/grid.h"
 #include "core/frames/point_order.h"
 #include "core/mesh/types.h"
+#include "server/sessions/chunk_bytes.h"
 
 namespace deform::server {
 
@@ -96,7 +97,7 @@ struct Frame {
     int64_t first_vertex = 0;
     int64_t vertex_count = 0;
     int64_t size = 0;
-    std::unique_ptr<uint8_t[]> bytes;
+    ChunkBytes bytes;
   };
 
   FrameInfo info;

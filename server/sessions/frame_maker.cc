@@ -13,15 +13,17 @@ namespace {
 // Points whose places one thread takes in a row.
 constexpr int64_t kCopiedTogether = 8192;
 
-// An encoding may write up to a whole chunk whatever it returns, so it writes
-// here first and the frame keeps what it needs.
-struct Scratch {
-  std::vector<float> positions;
-  std::vector<uint8_t> bytes;
-};
-Scratch& ThreadScratch() {
-  static thread_local Scratch scratch;
+std::vector<float>& ThreadScratch() {
+  static thread_local std::vector<float> scratch;
   return scratch;
+}
+
+// The memory as it is if the chunk fills most of it, else a copy.
+ChunkBytes Fitted(ChunkBytes bytes, int64_t size) {
+  if (size > kMaxChunkBytes / 2) return bytes;
+  ChunkBytes fitted = std::make_unique_for_overwrite<uint8_t[]>(size);
+  std::memcpy(fitted.get(), bytes.get(), size);
+  return fitted;
 }
 
 // `source` but for the positions, if the encoding is one of these: of those of
@@ -30,27 +32,29 @@ absl::StatusOr<Frame::Chunk> EncodeChunk(const FrameEncoding& encoding,
                                          const Vec3& origin,
                                          std::span<const float> positions,
                                          ChunkSource source) {
-  Scratch& scratch = ThreadScratch();
-  scratch.bytes.resize(kMaxChunkBytes);
+  // Encodings may write up to a whole chunk, whatever they return.
+  ChunkBytes bytes = TakeChunkBytes();
   const bool of_positions =
       !encoding.uses_grid() && encoding.needs() == Needs::kNothing;
+  const int64_t numbers = source.count * source.dimension;
   if (of_positions && !positions.empty()) {
-    source.positions = positions.subspan(source.first * source.dimension,
-                                         source.count * source.dimension);
+    source.positions =
+        positions.subspan(source.first * source.dimension, numbers);
   } else if (of_positions) {
-    scratch.positions.resize(source.count * source.dimension);
-    source.deformer->CopyRelative(source.first, source.count, origin,
-                                  scratch.positions.data());
-    source.positions = scratch.positions;
+    auto* to = reinterpret_cast<float*>(bytes.get());
+    if (!encoding.is_verbatim()) {
+      ThreadScratch().resize(numbers);
+      to = ThreadScratch().data();
+    }
+    source.deformer->CopyRelative(source.first, source.count, origin, to);
+    source.positions = {to, static_cast<size_t>(numbers)};
   }
   DEFORM_ASSIGN_OR_RETURN(const int64_t size,
-                          encoding.Encode(source, scratch.bytes.data()));
-  Frame::Chunk chunk{.first_vertex = source.first,
-                     .vertex_count = source.count,
-                     .size = size,
-                     .bytes = std::make_unique_for_overwrite<uint8_t[]>(size)};
-  std::memcpy(chunk.bytes.get(), scratch.bytes.data(), size);
-  return chunk;
+                          encoding.Encode(source, bytes.get()));
+  return Frame::Chunk{.first_vertex = source.first,
+                      .vertex_count = source.count,
+                      .size = size,
+                      .bytes = Fitted(std::move(bytes), size)};
 }
 
 // Calls body(i) for i < count; the first error by i.
@@ -143,7 +147,7 @@ absl::StatusOr<std::shared_ptr<const HeldRevision>> FrameMaker::GridOf(
   const int dimension = deformer.binding().dimension();
   std::span<const float> positions = positions_;
   if (positions.empty()) {
-    std::vector<float>& scratch = ThreadScratch().positions;
+    std::vector<float>& scratch = ThreadScratch();
     scratch.resize(points * dimension);
     deformer.CopyRelative(0, points, info.origin, scratch.data());
     positions = scratch;

@@ -4,9 +4,10 @@
 //
 //   stream_bench [RECEIVERS [SECONDS]]     2 receivers, 3 s a round by default
 //
-// Each round sends first the one, then the other. The server deforms a model
-// with few handles for every frame, as all sessions do; that is part of its
-// cost. Receivers put the frames of gRPC together, and only read those of TCP.
+// Each round sends, in turn, over TCP; frames of one revision, for which
+// receivers ask again and again (sending alone); and frames of poses, one after
+// the other, for each of which the server deforms a model with few handles.
+// Receivers put frames together, and only read the bytes of TCP.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -150,13 +151,15 @@ class Stream {
 
   int64_t frame_bytes() const { return points_ * 3 * int64_t{sizeof(float)}; }
 
-  void Measure(int receivers, double seconds, Reached& reached) {
+  // With poses or, without, the same frame again and again.
+  void Measure(bool poses, int receivers, double seconds, Reached& reached) {
     std::atomic<int64_t> frames = 0;
     std::atomic<bool> stop = false;
     std::vector<std::thread> threads;
     for (int r = 0; r < receivers; ++r) {
-      threads.emplace_back(
-          [&, sends = r == 0] { Receive(sends, stop, frames); });
+      threads.emplace_back([&, sends = poses && r == 0] {
+        Receive(sends, !poses, stop, frames);
+      });
     }
     // Until all are under way.
     while (frames < 4 * receivers) std::this_thread::yield();
@@ -184,8 +187,9 @@ class Stream {
     one(0, 0) *= 1 + 0.01 * static_cast<double>(number % 10);
     stream.Send({.vertices = {0}, .positions = one}).value();
   }
-  // All revisions, one after the other, whose poses come from who sends.
-  void Receive(bool sends, const std::atomic<bool>& stop,
+  // All revisions, one after the other, whose poses come from who sends; or who
+  // asks gets the present one again.
+  void Receive(bool sends, bool asks, const std::atomic<bool>& stop,
                std::atomic<int64_t>& frames) {
     auto own = Client::Connect(address_, {.own_connection = true}).value();
     DeformStream stream = own.Deform(session_, Delivery::kEvery).value();
@@ -195,6 +199,7 @@ class Stream {
     while (!stop && stream.NextFrame(frame).ok()) {
       ++frames;
       if (sends) Send(stream, sent++);
+      if (asks) stream.RequestKeyframe().IgnoreError();
     }
     stream.Cancel();
   }
@@ -207,24 +212,30 @@ class Stream {
   int64_t points_ = 0;
 };
 
+void Print(const char* what, const Reached& reached, const Reached& tcp) {
+  std::printf("  %-23s %.2f GB/s, %.2f of it; %.3f CPU s/GB, %.2f times\n",
+              what, 1e-9 * reached.bytes_per_second,
+              reached.bytes_per_second / tcp.bytes_per_second,
+              1e9 * reached.cpu_per_byte,
+              reached.cpu_per_byte / tcp.cpu_per_byte);
+  std::fflush(stdout);
+}
+
 void Compare(const std::string& folder, int64_t points, int receivers,
              double seconds) {
   Stream stream(folder, points);
-  Reached tcp, frames;
+  Reached tcp, same, posed;
   for (int round = 0; round < kRounds; ++round) {
     MeasureTcp(folder + "/stream_bench", stream.frame_bytes(), receivers,
                seconds, tcp);
-    stream.Measure(receivers, seconds, frames);
+    stream.Measure(false, receivers, seconds, same);
+    stream.Measure(true, receivers, seconds, posed);
   }
-  std::printf(
-      "%.1f MB to %d receivers: TCP %.2f GB/s, %.3f CPU s/GB; frames %.2f "
-      "GB/s, %.2f of it, %.3f CPU s/GB, %.2f times\n",
-      1e-6 * static_cast<double>(stream.frame_bytes()), receivers,
-      1e-9 * tcp.bytes_per_second, 1e9 * tcp.cpu_per_byte,
-      1e-9 * frames.bytes_per_second,
-      frames.bytes_per_second / tcp.bytes_per_second, 1e9 * frames.cpu_per_byte,
-      frames.cpu_per_byte / tcp.cpu_per_byte);
-  std::fflush(stdout);
+  std::printf("%.1f MB to %d receivers: TCP %.2f GB/s, %.3f CPU s/GB\n",
+              1e-6 * static_cast<double>(stream.frame_bytes()), receivers,
+              1e-9 * tcp.bytes_per_second, 1e9 * tcp.cpu_per_byte);
+  Print("frames of one revision", same, tcp);
+  Print("frames of poses", posed, tcp);
 }
 
 int Main(int count, char** arguments) {

@@ -15,6 +15,7 @@ class Float32 final : public FrameEncoding {
  public:
   absl::string_view id() const override { return "float32"; }
   bool is_exact() const override { return true; }
+  bool is_verbatim() const override { return true; }
   double FinestTolerance(double /*reach*/) const override { return 0; }
 
   int64_t PointsPerChunk(int dimension) const override {
@@ -23,9 +24,10 @@ class Float32 final : public FrameEncoding {
 
   absl::StatusOr<int64_t> Encode(const ChunkSource& source,
                                  uint8_t* out) const override {
+    const auto* const bytes =
+        reinterpret_cast<const uint8_t*>(source.positions.data());
     // Not memcpy: an empty span may have no address.
-    std::copy_n(reinterpret_cast<const uint8_t*>(source.positions.data()),
-                source.positions.size_bytes(), out);
+    if (bytes != out) std::copy_n(bytes, source.positions.size_bytes(), out);
     return static_cast<int64_t>(source.positions.size_bytes());
   }
 

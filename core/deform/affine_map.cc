@@ -38,6 +38,17 @@ Eigen::Matrix3d FitSpatial(const Positions& rest, const Positions& posed,
 
 }  // namespace
 
+PointMap PointMapOf(const AffineMap& map, const Vec3& origin) {
+  PointMap from_origin;
+  for (int d = 0; d < 3; ++d) {
+    for (int k = 0; k < 3; ++k) from_origin.linear[d][k] = map.linear(d, k);
+    from_origin.from[d] = map.from(d);
+    from_origin.to[d] = map.to(d);
+    from_origin.origin[d] = origin(d);
+  }
+  return from_origin;
+}
+
 AffineMap FitSimilarity(const PositionsRef& rest, const PositionsRef& posed,
                         int dimension) {
   AffineMap map;

@@ -1,6 +1,7 @@
 // The rigid part of a pose.
 #pragma once
 
+#include "core/kernels/map_points.h"
 #include "core/mesh/types.h"
 
 namespace deform {
@@ -13,6 +14,9 @@ struct AffineMap {
   Vec3 to = Vec3::Zero();
   Vec3 operator()(const Vec3& x) const { return linear * (x - from) + to; }
 };
+
+// The same, seen from `origin`.
+PointMap PointMapOf(const AffineMap& map, const Vec3& origin);
 
 // The similarity (rotation, uniform scale, translation; never a reflection)
 // that maps the rows of `rest` to those of `posed` best in the least-squares

@@ -123,40 +123,42 @@ bool Deformer::PrefersFull(const std::vector<int32_t>& changed,
   return false;
 }
 
-template <typename Body>
-void Deformer::ForEachPoint(int64_t first, int64_t count, Body body) const {
-  constexpr int64_t kPoints = 256;
-  double displacements[kPoints * 3];
-  for (int64_t at = 0; at < count; at += kPoints) {
-    const int64_t some = std::min(kPoints, count - at);
-    sums_->Copy(first + at, some, displacements);
-    for (int64_t i = 0; i < some; ++i) {
-      const int64_t point = first + at + i;
-      const Vec3 rest = binding_->model()->positions().row(point).transpose();
-      const bool fixed = !fixed_.empty() && fixed_[point];
-      body(at + i, fixed ? rest
-                         : Vec3(map_(rest) +
-                                Eigen::Map<const Vec3>(displacements + 3 * i)));
-    }
-  }
-}
-
 Positions Deformer::positions() const {
   Positions all(binding_->point_count(), 3);
-  ForEachPoint(0, all.rows(), [&](int64_t i, const Vec3& point) {
-    all.row(i) = point.transpose();
-  });
+  sums_->Copy(0, all.rows(), all.data());
+  const Positions& rest = binding_->model()->positions();
+  for (int64_t i = 0; i < all.rows(); ++i) {
+    const Vec3 at = rest.row(i).transpose();
+    const Vec3 displacement = all.row(i).transpose();
+    all.row(i) = (is_fixed(i) ? at : Vec3(map_(at) + displacement)).transpose();
+  }
   return all;
 }
 
 void Deformer::CopyRelative(int64_t first, int64_t count, const Vec3& origin,
                             float* out) const {
+  constexpr int64_t kPoints = 256;
+  double displacements[kPoints * 3];
+  float flat[kPoints * 3];
+  const PointMap map = PointMapOf(map_, origin);
+  const Positions& rest = binding_->model()->positions();
   const int dimension = binding_->dimension();
-  ForEachPoint(first, count, [&](int64_t i, const Vec3& point) {
-    for (int d = 0; d < dimension; ++d) {
-      out[i * dimension + d] = static_cast<float>(point(d) - origin(d));
+  for (int64_t at = first; at < first + count; at += kPoints) {
+    const int64_t some = std::min(kPoints, first + count - at);
+    sums_->Copy(at, some, displacements);
+    float* const points = dimension == 3 ? out : flat;
+    MapPoints(map, rest.row(at).data(), displacements, some, points);
+    for (int64_t i = 0; i < some && !fixed_.empty(); ++i) {
+      if (!is_fixed(at + i)) continue;
+      for (int d = 0; d < 3; ++d) {
+        points[3 * i + d] = static_cast<float>(rest(at + i, d) - origin(d));
+      }
     }
-  });
+    for (int64_t i = 0; i < some && dimension == 2; ++i) {
+      std::copy_n(flat + 3 * i, 2, out + 2 * i);
+    }
+    out += some * dimension;
+  }
 }
 
 void MoveTogether(std::span<DeformJob> jobs, ThreadPool* pool) {

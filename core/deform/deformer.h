@@ -97,9 +97,10 @@ class Deformer {
   Vec3 Residual(const Columns& columns, int64_t c) const;
   // Of all columns of the pose, in units of R_c.
   double LargestResidual() const;
-  // Calls body(i, point) for points [first, first + count).
-  template <typename Body>
-  void ForEachPoint(int64_t first, int64_t count, Body body) const;
+  // It stays at rest.
+  bool is_fixed(int64_t point) const {
+    return !fixed_.empty() && fixed_[point];
+  }
 
   const std::shared_ptr<const Binding> binding_;
   ThreadPool* const pool_;

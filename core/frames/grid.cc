@@ -1,11 +1,13 @@
 #include "core/frames/grid.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cassert>
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/error.h"
+#include "core/base/thread_pool.h"
 
 namespace deform {
 namespace {
@@ -30,6 +32,29 @@ absl::Status CheckOnGrid(const float* x, int dimension, double step,
   return absl::OkStatus();
 }
 
+// Points that a thread puts on the grid in a row.
+constexpr int64_t kPart = 32 * kGridBlock;
+
+// Those from `first` on, a block. False if one may not be on the grid.
+bool PutBlock(const float* positions, int dimension, double per_step,
+              const PointOrder& order, int64_t first, Grid& grid) {
+  alignas(64) float block[3][kGridBlock];
+  const int64_t count = std::min(kGridBlock, order.size() - first);
+  for (int64_t i = 0; i < kGridBlock; ++i) {
+    const int64_t point = order.points()[first + std::min(i, count - 1)];
+    const float* const x = positions + point * dimension;
+    block[0][i] = x[0];
+    block[1][i] = x[1];
+    if (dimension == 3) block[2][i] = x[2];
+  }
+  bool within = true;
+  for (int d = 0; d < dimension; ++d) {
+    within &=
+        RoundToGrid(block[d], per_step, kGridLimit, grid.coordinate(d) + first);
+  }
+  return within;
+}
+
 }  // namespace
 
 Grid::Grid(int64_t points)
@@ -48,35 +73,27 @@ void Grid::Pad() {
 }
 
 absl::StatusOr<Grid> PutOnGrid(std::span<const float> positions, int dimension,
-                               double step, const PointOrder& order) {
+                               double step, const PointOrder& order,
+                               ThreadPool* pool) {
   const int64_t points = order.size();
   assert(static_cast<int64_t>(positions.size()) == points * dimension);
-  const double per_step = 1 / step;
   Grid grid(points);
-  alignas(64) float block[3][kGridBlock] = {};
-  for (int64_t first = 0; first < points; first += kGridBlock) {
-    const int64_t count = std::min(kGridBlock, points - first);
-    for (int64_t i = 0; i < kGridBlock; ++i) {
-      const int64_t point = order.points()[first + std::min(i, count - 1)];
-      const float* const x = positions.data() + point * dimension;
-      block[0][i] = x[0];
-      block[1][i] = x[1];
-      if (dimension == 3) block[2][i] = x[2];
-    }
-    bool within = true;
-    for (int d = 0; d < dimension; ++d) {
-      within &= RoundToGrid(block[d], per_step, kGridLimit,
-                            grid.coordinate(d) + first);
-    }
-    if (within) continue;
-    for (int64_t i = first; i < first + count; ++i) {
-      const int64_t point = order.points()[i];
-      if (absl::Status status = CheckOnGrid(
-              positions.data() + point * dimension, dimension, step, point);
-          !status.ok()) {
-        return status;
+  std::atomic<bool> within = true;
+  const int64_t parts = (points + kPart - 1) / kPart;
+  ParallelFor(pool, parts, nullptr, [&](int64_t part) {
+    const int64_t end = std::min((part + 1) * kPart, points);
+    for (int64_t first = part * kPart; first < end; first += kGridBlock) {
+      if (!PutBlock(positions.data(), dimension, 1 / step, order, first,
+                    grid)) {
+        within = false;
       }
     }
+  });
+  if (within) return grid;
+  for (const int32_t point : order.points()) {
+    const absl::Status status = CheckOnGrid(
+        positions.data() + int64_t{point} * dimension, dimension, step, point);
+    if (!status.ok()) return status;
   }
   return grid;
 }

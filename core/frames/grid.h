@@ -23,6 +23,8 @@
 
 namespace deform {
 
+class ThreadPool;
+
 // Integers made here are not larger than this.
 inline constexpr int32_t kGridLimit = int32_t{1} << 20;
 
@@ -58,9 +60,10 @@ class Grid {
 
 // Puts `positions` (N x dimension, relative to the origin, in the order of the
 // model) on the grid. FailedPrecondition OUT_OF_GRID, InvalidArgument
-// NON_FINITE; both name the point.
+// NON_FINITE; both name the point. `pool` may be null.
 absl::StatusOr<Grid> PutOnGrid(std::span<const float> positions, int dimension,
-                               double step, const PointOrder& order);
+                               double step, const PointOrder& order,
+                               ThreadPool* pool = nullptr);
 
 // The reverse, for grids of any content.
 void TakeOffGrid(const Grid& grid, double step, const PointOrder& order,

@@ -13,25 +13,33 @@
 namespace deform {
 namespace {
 
-// Points that are placed at a time.
-constexpr int64_t kPoints = 4096;
+// Points that are placed at a time, and that a thread places in a row.
+constexpr int64_t kPoints = 256;
+constexpr int64_t kPart = 16 * kPoints;
 
-// Places points [first, first + count) with the sums of all slots, as
-// Deformer::CopyRelative() does. False if one comes out at no finite place.
-bool Place(const AffineMap& map, const LeafBasis& basis, const float* sums,
-           const Vec3& origin, int64_t first, int64_t count, float* out) {
-  const int dimension = basis.dimension();
+// Places points [first, first + count), at most kPoints, with the sums of all
+// slots, as Deformer::CopyRelative() does. False if one comes out at no finite
+// place.
+bool Place(const PointMap& map, const LeafBasis& basis, const float* sums,
+           int64_t first, int64_t count, float* out) {
+  double displacements[kPoints * 3];
+  float points[kPoints * 3];
   const auto rest = basis.rest();
+  for (int64_t i = 0; i < count; ++i) {
+    const int64_t slot = std::max(0, basis.slots()[first + i]);
+    const float* const sum =
+        sums + slot / kTilePoints * kTileSums + slot % kTilePoints;
+    for (int d = 0; d < 3; ++d) displacements[3 * i + d] = sum[d * kTilePoints];
+  }
+  MapPoints(map, rest.row(first).data(), displacements, count, points);
+  const int dimension = basis.dimension();
   bool finite = true;
-  for (int64_t i = first; i < first + count; ++i) {
-    Vec3 point = rest.row(i).transpose();
-    if (const int64_t slot = basis.slots()[i]; slot >= 0) {
-      const float* sum =
-          sums + slot / kTilePoints * kTileSums + slot % kTilePoints;
-      point = map(point) + Vec3(sum[0], sum[kTilePoints], sum[2 * kTilePoints]);
-    }
+  for (int64_t i = 0; i < count; ++i) {
+    const bool fixed = basis.slots()[first + i] < 0;
     for (int d = 0; d < dimension; ++d) {
-      const auto x = static_cast<float>(point(d) - origin(d));
+      const float x =
+          fixed ? static_cast<float>(rest(first + i, d) - map.origin[d])
+                : points[3 * i + d];
       finite = finite && std::isfinite(x);
       out[i * dimension + d] = x;
     }
@@ -49,7 +57,8 @@ absl::Status PlacePoints(const LeafPose& pose, const LeafBasis& basis,
                          const Vec3& origin, ThreadPool* pool,
                          std::span<float> positions) {
   assert(std::ssize(positions) == basis.point_count() * basis.dimension());
-  const AlignedArray<float> sums(basis.slot_count() * 3);
+  // Of one tile at least: points without slot read it, and do not use it.
+  const AlignedArray<float> sums(std::max(kTileSums, basis.slot_count() * 3));
   const auto& leaves = basis.leaves();
   ParallelFor(pool, std::ssize(leaves), nullptr, [&](int64_t l) {
     const LeafBasis::Leaf& leaf = leaves[l];
@@ -58,13 +67,15 @@ absl::Status PlacePoints(const LeafPose& pose, const LeafBasis& basis,
                sums.get() + leaf.first_slot * 3);
   });
   std::atomic<bool> finite = true;
-  const int64_t parts = (basis.point_count() + kPoints - 1) / kPoints;
+  const PointMap map = PointMapOf(pose.map, origin);
+  const int64_t parts = (basis.point_count() + kPart - 1) / kPart;
   ParallelFor(pool, parts, nullptr, [&](int64_t part) {
-    const int64_t first = part * kPoints;
-    const int64_t count = std::min(kPoints, basis.point_count() - first);
-    if (!Place(pose.map, basis, sums.get(), origin, first, count,
-               positions.data())) {
-      finite = false;
+    const int64_t end = std::min((part + 1) * kPart, basis.point_count());
+    for (int64_t first = part * kPart; first < end; first += kPoints) {
+      if (!Place(map, basis, sums.get(), first, std::min(kPoints, end - first),
+                 positions.data() + first * basis.dimension())) {
+        finite = false;
+      }
     }
   });
   if (finite) return absl::OkStatus();

@@ -57,6 +57,20 @@ absl::StatusOr<Frame::Chunk> EncodeChunk(const FrameEncoding& encoding,
                       .bytes = Fitted(std::move(bytes), size)};
 }
 
+// All points relative to `origin`, in parallel.
+void CopyAll(const Deformer& deformer, const Vec3& origin, ThreadPool* pool,
+             std::span<float> out) {
+  const int64_t points = deformer.binding().point_count();
+  const int dimension = deformer.binding().dimension();
+  ParallelFor(pool, (points + kCopiedTogether - 1) / kCopiedTogether, nullptr,
+              [&](int64_t block) {
+                const int64_t first = block * kCopiedTogether;
+                deformer.CopyRelative(first,
+                                      std::min(kCopiedTogether, points - first),
+                                      origin, out.data() + dimension * first);
+              });
+}
+
 // Calls body(i) for i < count; the first error by i.
 template <typename Body>
 absl::Status ForEachChunk(int64_t count, ThreadPool* pool, Body body) {
@@ -116,13 +130,7 @@ std::shared_ptr<const FrameNormals> FrameMaker::Normals(
   if (fans_ == nullptr) fans_ = tables_->FansOf(deformer.binding().model());
   const int64_t points = deformer.binding().point_count();
   positions_.resize(3 * points);
-  ParallelFor(pool, (points + kCopiedTogether - 1) / kCopiedTogether, nullptr,
-              [&](int64_t block) {
-                const int64_t first = block * kCopiedTogether;
-                deformer.CopyRelative(
-                    first, std::min(kCopiedTogether, points - first),
-                    info.origin, positions_.data() + 3 * first);
-              });
+  CopyAll(deformer, info.origin, pool, positions_);
   FrameNormals normals(kNormalBytes * points);
   fans_->EncodeNormals(positions_, normals, pool);
   normals_ = std::make_shared<const FrameNormals>(std::move(normals));
@@ -139,7 +147,8 @@ std::shared_ptr<const HeldRevision> FrameMaker::PoseOf(const Deformer& deformer,
 }
 
 absl::StatusOr<std::shared_ptr<const HeldRevision>> FrameMaker::GridOf(
-    const Deformer& deformer, const FrameInfo& info, double step) {
+    const Deformer& deformer, const FrameInfo& info, double step,
+    ThreadPool* pool) {
   const auto made = grids_.find(step);
   if (made != grids_.end()) return made->second;
   if (order_ == nullptr) order_ = tables_->OrderOf(deformer.binding().model());
@@ -149,11 +158,11 @@ absl::StatusOr<std::shared_ptr<const HeldRevision>> FrameMaker::GridOf(
   if (positions.empty()) {
     std::vector<float>& scratch = ThreadScratch();
     scratch.resize(points * dimension);
-    deformer.CopyRelative(0, points, info.origin, scratch.data());
+    CopyAll(deformer, info.origin, pool, scratch);
     positions = scratch;
   }
   DEFORM_ASSIGN_OR_RETURN(Grid grid,
-                          PutOnGrid(positions, dimension, step, *order_));
+                          PutOnGrid(positions, dimension, step, *order_, pool));
   auto held = std::make_shared<const HeldRevision>(HeldRevision{
       .revision = info.revision, .step = step, .content = std::move(grid)});
   grids_[step] = held;
@@ -171,7 +180,7 @@ absl::StatusOr<std::shared_ptr<const Frame>> FrameMaker::Encode(
   frame->encoding = &encoding;
   frame->error_bound = info.weight_error + share;
   if (encoding.uses_grid()) {
-    DEFORM_ASSIGN_OR_RETURN(frame->held, GridOf(deformer, info, share));
+    DEFORM_ASSIGN_OR_RETURN(frame->held, GridOf(deformer, info, share, pool));
     frame->order = order_;
   } else if (encoding.refers()) {
     frame->held = PoseOf(deformer, info);

@@ -54,7 +54,8 @@ class FrameMaker {
   // What is kept is of this revision.
   void Begin(const FrameInfo& info);
   absl::StatusOr<std::shared_ptr<const HeldRevision>> GridOf(
-      const Deformer& deformer, const FrameInfo& info, double step);
+      const Deformer& deformer, const FrameInfo& info, double step,
+      ThreadPool* pool);
   std::shared_ptr<const HeldRevision> PoseOf(const Deformer& deformer,
                                              const FrameInfo& info);
   absl::StatusOr<std::shared_ptr<const Frame>> Encode(const Deformer& deformer,

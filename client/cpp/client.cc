@@ -36,6 +36,19 @@ grpc::ChannelArguments ChannelArguments() {
   return arguments;
 }
 
+// The progress that a message tells, if it does. Who gives up has the call
+// cancelled.
+template <typename Response>
+void PassOn(const Response& response, const ProgressCallback& progress,
+            grpc::ClientContext& context) {
+  if (!response.has_progress() || !progress) return;
+  const auto& told = response.progress();
+  if (!progress(static_cast<int64_t>(told.points_done()),
+                static_cast<int64_t>(told.points_total()))) {
+    context.TryCancel();
+  }
+}
+
 bool Holds(const DeformOptions& options, Needs what) {
   switch (what) {
     case Needs::kNothing:
@@ -176,14 +189,8 @@ absl::StatusOr<BindingInfo> Client::CreateBinding(
   v1::CreateBindingResponse response;
   std::optional<BindingInfo> info;
   while (call->Read(&response)) {
-    if (response.has_binding()) {
-      info = FromProto(response.binding());
-    } else if (response.has_progress() && progress &&
-               !progress(
-                   static_cast<int64_t>(response.progress().points_done()),
-                   static_cast<int64_t>(response.progress().points_total()))) {
-      context.TryCancel();
-    }
+    if (response.has_binding()) info = FromProto(response.binding());
+    PassOn(response, progress, context);
   }
   DEFORM_RETURN_IF_ERROR(FromGrpc(call->Finish()));
   if (!info) return absl::InternalError("the server ended without a binding");
@@ -208,14 +215,8 @@ absl::StatusOr<EditedBinding> Client::EditHandles(
   v1::EditHandlesResponse response;
   std::optional<EditedBinding> edited;
   while (call->Read(&response)) {
-    if (response.has_edited()) {
-      edited = FromProto(response.edited());
-    } else if (response.has_progress() && progress &&
-               !progress(
-                   static_cast<int64_t>(response.progress().points_done()),
-                   static_cast<int64_t>(response.progress().points_total()))) {
-      context.TryCancel();
-    }
+    if (response.has_edited()) edited = FromProto(response.edited());
+    PassOn(response, progress, context);
   }
   DEFORM_RETURN_IF_ERROR(FromGrpc(call->Finish()));
   if (!edited) return absl::InternalError("the server ended without a binding");
@@ -279,15 +280,10 @@ absl::StatusOr<QualityInfo> Client::GetQuality(
   absl::StatusOr<QualityInfo> info =
       absl::InternalError("the server ended without a report");
   while (call->Read(&response)) {
-    if (response.has_progress()) {
-      if (progress &&
-          !progress(static_cast<int64_t>(response.progress().points_done()),
-                    static_cast<int64_t>(response.progress().points_total()))) {
-        context.TryCancel();
-      }
-    } else if (response.has_report()) {
+    PassOn(response, progress, context);
+    if (response.has_report()) {
       info = FromProto(response.report());
-    } else if (info.ok()) {
+    } else if (response.has_points() && info.ok()) {
       const absl::Status added = AddPoints(response.points(), *info);
       if (!added.ok()) info = added;
     }

@@ -105,6 +105,7 @@ bool RoundLeaf(const LeafBasis::Leaf& leaf, int dimension,
     if (tries >= kTries && good >= 0) break;
     // Losses are about proportional to steps.
     const double further = std::floor(4 * std::log2(1 / lost));
+    if (lost <= 1 && further < 1) break;  // The next would lose too much.
     scale = static_cast<int>(
         std::clamp<double>(scale + further, good + 1, bad - 1));
   }

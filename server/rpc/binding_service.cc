@@ -118,11 +118,7 @@ grpc::Status BindingService::GetBinding(grpc::ServerContext* context,
                                         const v1::GetBindingRequest* request,
                                         v1::GetBindingResponse* response) {
   return calls_.Run("GetBinding", *context, [&]() -> absl::Status {
-    DEFORM_ASSIGN_OR_RETURN(const std::string tenant,
-                            TenantOr(request->tenant()));
-    DEFORM_ASSIGN_OR_RETURN(
-        const auto record,
-        bindings_.catalogue().Find(tenant, request->binding_id()));
+    DEFORM_ASSIGN_OR_RETURN(const auto record, Find(*request));
     Describe(*record, Detail::kFull, response->mutable_binding());
     if (request->with_rig()) {
       ToProto(record->facts.rig(), response->mutable_rig());
@@ -168,11 +164,7 @@ grpc::Status BindingService::GetWeights(
     grpc::ServerWriter<v1::GetWeightsResponse>* writer) {
   return calls_.Run("GetWeights", *context, [&]() -> absl::Status {
     PeerWriter<v1::GetWeightsResponse> peer(calls_, *context, *writer);
-    DEFORM_ASSIGN_OR_RETURN(const std::string tenant,
-                            TenantOr(request->tenant()));
-    DEFORM_ASSIGN_OR_RETURN(
-        const auto record,
-        bindings_.catalogue().Find(tenant, request->binding_id()));
+    DEFORM_ASSIGN_OR_RETURN(const auto record, Find(*request));
     const auto is_wanted = [&] { return !peer.IsGone(); };
     const bool again =
         request->precision() == v1::WEIGHT_PRECISION_RECOMPUTED_FLOAT64;
@@ -204,13 +196,10 @@ grpc::Status BindingService::GetQuality(
     grpc::ServerWriter<v1::GetQualityResponse>* writer) {
   return calls_.Run("GetQuality", *context, [&]() -> absl::Status {
     PeerWriter<v1::GetQualityResponse> peer(calls_, *context, *writer);
-    DEFORM_ASSIGN_OR_RETURN(const std::string tenant,
-                            TenantOr(request->tenant()));
+    DEFORM_ASSIGN_OR_RETURN(const auto record, Find(*request));
     DEFORM_ASSIGN_OR_RETURN(
-        const auto record,
-        bindings_.catalogue().Find(tenant, request->binding_id()));
-    DEFORM_ASSIGN_OR_RETURN(
-        QualityTask task, ToQualityTask(*request, tenant, *record, sessions_));
+        QualityTask task,
+        ToQualityTask(*request, record->tenant, *record, sessions_));
     if (task.posed) {
       DEFORM_ASSIGN_OR_RETURN(task.binding, bindings_.WeightsOf(record, [&] {
         return !peer.IsGone();

@@ -52,6 +52,14 @@ class BindingService final : public v1::BindingService::Service {
                            v1::ListSchemesResponse* response) override;
 
  private:
+  // That a request names. InvalidArgument BAD_NAME, NotFound BINDING_NOT_FOUND.
+  template <typename Request>
+  absl::StatusOr<std::shared_ptr<const BindingRecord>> Find(
+      const Request& request) const {
+    const absl::StatusOr<std::string> tenant = TenantOr(request.tenant());
+    if (!tenant.ok()) return tenant.status();
+    return bindings_.catalogue().Find(*tenant, request.binding_id());
+  }
   // With where its weights are.
   void Describe(const BindingRecord& record, Detail detail, v1::Binding* out);
   // The model whose box the request wants handles at; null if it wants none.

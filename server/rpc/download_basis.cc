@@ -47,19 +47,15 @@ grpc::Status BindingService::DownloadBasis(
     grpc::ServerWriter<v1::DownloadBasisResponse>* writer) {
   return calls_.Run("DownloadBasis", *context, [&]() -> absl::Status {
     PeerWriter<v1::DownloadBasisResponse> peer(calls_, *context, *writer);
-    DEFORM_ASSIGN_OR_RETURN(const std::string tenant,
-                            TenantOr(request->tenant()));
-    DEFORM_ASSIGN_OR_RETURN(
-        const auto record,
-        bindings_.catalogue().Find(tenant, request->binding_id()));
+    DEFORM_ASSIGN_OR_RETURN(const auto record, Find(*request));
+    // Asked before the weights: who has been compressed meanwhile is not dense.
+    const bool compressing =
+        bindings_.compressor().ProgressOf(*record).has_value();
     DEFORM_ASSIGN_OR_RETURN(
         const auto weights,
         bindings_.WeightsOf(record, [&] { return !peer.IsGone(); }));
     const auto named = sessions_.frame_tables().BasisOf(weights);
-    if (named == nullptr) {
-      return NoBasis(*record,
-                     bindings_.compressor().ProgressOf(*record).has_value());
-    }
+    if (named == nullptr) return NoBasis(*record, compressing);
     v1::DownloadBasisResponse message;
     message.mutable_header()->set_basis_id(named->id);
     message.mutable_header()->set_byte_count(named->basis->byte_count());

@@ -6,6 +6,8 @@
 
 #include "core/base/error.h"
 #include "core/frames/leaf_basis.h"
+#include "deform/v1/binding.pb.h"
+#include "tests/end_to_end/raw_call.h"
 #include "tests/end_to_end/running_server.h"
 
 namespace deform {
@@ -149,6 +151,22 @@ TEST_F(HeldBasisTest, DenseWeightsHaveNone) {
               HasSubstr("its weights are dense (they are small: "));
   EXPECT_EQ(client().DownloadBasis("nowhere").status().code(),
             absl::StatusCode::kNotFound);
+}
+
+// Who does not wait is told to come again, until it is there.
+TEST_F(HeldBasisTest, WhileWeightsAreCompressedThereIsNoneYet) {
+  v1::DownloadBasisRequest request;
+  request.set_binding_id(binding_.binding_id);
+  for (;;) {
+    const RawAnswer answer =
+        RawCall(server_.address(), "/deform.v1.BindingService/DownloadBasis",
+                request.SerializeAsString());
+    if (answer.status.ok()) break;
+    EXPECT_EQ(answer.status.code(), absl::StatusCode::kFailedPrecondition);
+    EXPECT_EQ(DetailOf(answer.status).reason, "NO_BASIS");
+    EXPECT_THAT(std::string(answer.status.message()),
+                HasSubstr("its weights are being compressed, try again"));
+  }
 }
 
 TEST_F(HeldBasisTest, ABasisOfAnotherModelIsRefused) {

@@ -1,6 +1,5 @@
 #include "core/frames/encodings/basis.h"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -9,6 +8,7 @@
 #include "core/base/error.h"
 #include "core/base/status_macros.h"
 #include "core/frames/basis_payload.h"
+#include "core/frames/encodings/one_chunk.h"
 #include "core/frames/leaf_pose.h"
 
 namespace deform {
@@ -38,14 +38,7 @@ class BasisFrames final : public FrameEncoding {
         const std::vector<uint8_t> bytes,
         EncodeLeafPose(LeafPoseOf(*source.deformer), *source.basis,
                        source.tolerance, source.pool));
-    if (std::ssize(bytes) > kMaxChunkBytes) {
-      return MakeError(absl::StatusCode::kFailedPrecondition,
-                       absl::StrCat("leaf coefficients take ", bytes.size(),
-                                    " bytes, a chunk at most ", kMaxChunkBytes),
-                       {.reason = "FRAME_TOO_LARGE"});
-    }
-    std::copy(bytes.begin(), bytes.end(), out);
-    return std::ssize(bytes);
+    return PutInOneChunk("a frame of leaf coefficients", bytes, out);
   }
 
   absl::Status Decode(std::span<const uint8_t> bytes,

@@ -1,12 +1,11 @@
 #include "core/frames/encodings/pose.h"
 
-#include <algorithm>
 #include <limits>
 
 #include "absl/strings/str_cat.h"
-#include "core/base/error.h"
 #include "core/base/status_macros.h"
 #include "core/deform/deformer.h"
+#include "core/frames/encodings/one_chunk.h"
 #include "core/frames/pose_payload.h"
 
 namespace deform {
@@ -30,14 +29,7 @@ class PoseFrames final : public FrameEncoding {
     const std::vector<uint8_t> bytes =
         EncodePose(source.deformer->pose(), source.reference_pose,
                    ShapeOf(source.deformer->binding().rig()));
-    if (std::ssize(bytes) > kMaxChunkBytes) {
-      return MakeError(absl::StatusCode::kFailedPrecondition,
-                       absl::StrCat("a pose takes ", bytes.size(),
-                                    " bytes, a chunk at most ", kMaxChunkBytes),
-                       {.reason = "FRAME_TOO_LARGE"});
-    }
-    std::copy(bytes.begin(), bytes.end(), out);
-    return std::ssize(bytes);
+    return PutInOneChunk("a pose", bytes, out);
   }
 
   absl::Status Decode(std::span<const uint8_t> bytes,

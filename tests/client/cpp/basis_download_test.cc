@@ -2,12 +2,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include <string>
 
 #include "core/base/error.h"
 #include "core/frames/leaf_basis.h"
+#include "tests/client/cpp/chunks.h"
 #include "tests/core/frames/leaf_bases.h"
 
 namespace deform {
@@ -23,13 +23,7 @@ v1::DownloadBasisResponse Header(const std::string& id, uint64_t bytes) {
 }
 
 v1::DownloadBasisResponse Chunk(uint64_t offset, const std::string& data) {
-  v1::DownloadBasisResponse part;
-  part.mutable_chunk()->set_offset(offset);
-  part.mutable_chunk()->set_data(data);
-  part.mutable_chunk()->set_crc32(static_cast<uint32_t>(
-      crc32(0, reinterpret_cast<const Bytef*>(data.data()),
-            static_cast<uInt>(data.size()))));
-  return part;
+  return ChunkOf<v1::DownloadBasisResponse>(offset, data);
 }
 
 // Why the last part is refused.

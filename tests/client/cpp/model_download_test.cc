@@ -2,11 +2,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include <string>
 
 #include "core/base/error.h"
+#include "tests/client/cpp/chunks.h"
 
 namespace deform {
 namespace {
@@ -23,13 +23,7 @@ v1::DownloadModelResponse Header(uint32_t dimension, uint64_t vertices,
 }
 
 v1::DownloadModelResponse Chunk(uint64_t offset, const std::string& data) {
-  v1::DownloadModelResponse part;
-  part.mutable_chunk()->set_offset(offset);
-  part.mutable_chunk()->set_data(data);
-  part.mutable_chunk()->set_crc32(static_cast<uint32_t>(
-      crc32(0, reinterpret_cast<const Bytef*>(data.data()),
-            static_cast<uInt>(data.size()))));
-  return part;
+  return ChunkOf<v1::DownloadModelResponse>(offset, data);
 }
 
 template <typename Number>

@@ -6,6 +6,7 @@
 #include "core/base/error.h"
 #include "core/deform/deformer.h"
 #include "core/frames/encoding.h"
+#include "core/frames/encodings/one_chunk.h"
 #include "core/frames/leaf_basis.h"
 #include "tests/core/frames/leaf_bases.h"
 
@@ -69,6 +70,19 @@ TEST_F(BasisEncodingTest, IsNotForDenseWeights) {
   const absl::Status status = encoding_.Encode(source_, bytes.data()).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_EQ(DetailOf(status).reason, "NO_BASIS");
+}
+
+TEST(PutInOneChunk, TellsWhatIsTooLargeForOne) {
+  std::vector<uint8_t> bytes(kMaxChunkBytes, 7), out(kMaxChunkBytes);
+  EXPECT_EQ(PutInOneChunk("a pose", bytes, out.data()).value(), kMaxChunkBytes);
+  EXPECT_EQ(out, bytes);
+  bytes.push_back(7);
+  const absl::Status status =
+      PutInOneChunk("a pose", bytes, out.data()).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(DetailOf(status).reason, "FRAME_TOO_LARGE");
+  EXPECT_EQ(status.message(),
+            "a pose takes 1048577 bytes, a chunk at most 1048576");
 }
 
 TEST_F(BasisEncodingTest, IsRefusedWithoutTheBasis) {

@@ -45,6 +45,16 @@ class FormChangeTest : public testing::Test {
     stream.TakeFrame();
     return stream;
   }
+  // Takes frames of the basis.
+  FakeStream JoinForBasis() {
+    FakeStream stream;
+    const FrameWishes wishes{.encodings = {FindEncoding("basis")},
+                             .tolerance = 1e-3};
+    auto joined = session_->Join(Delivery::kEvery, wishes, stream.receiver);
+    stream.participant = std::move(joined->participant);
+    compute_.RunAll();
+    return stream;
+  }
   FrameToSend Posed(FakeStream& stream, uint64_t sequence,
                     const PoseUpdate& update) {
     stream.participant->Submit(sequence, update);
@@ -141,12 +151,7 @@ TEST_F(FormChangeTest, TellsWhoTakesItOfTheBasis) {
             "")
       << "nobody wants it";
 
-  const FrameWishes wishes{.encodings = {FindEncoding("basis")},
-                           .tolerance = 1e-3};
-  FakeStream taker;
-  taker.participant = std::move(
-      session_->Join(Delivery::kEvery, wishes, taker.receiver)->participant);
-  compute_.RunAll();
+  FakeStream taker = JoinForBasis();
   EXPECT_EQ(taker.TakeFrame().frame->encoding->id(), "float32");
   const FrameToSend told = Posed(plain, 3, MoveVertex(7, {1.5, 1.2, 1}));
   const std::string id = told.frame->info.basis_id;
@@ -159,12 +164,7 @@ TEST_F(FormChangeTest, TellsWhoTakesItOfTheBasis) {
 }
 
 TEST_F(FormChangeTest, FramesOfTheBasisBeginAfterTheFormHasChanged) {
-  const FrameWishes wishes{.encodings = {FindEncoding("basis")},
-                           .tolerance = 1e-3};
-  FakeStream taker;
-  taker.participant = std::move(
-      session_->Join(Delivery::kEvery, wishes, taker.receiver)->participant);
-  compute_.RunAll();
+  FakeStream taker = JoinForBasis();
   EXPECT_EQ(taker.TakeFrame().frame->info.basis_id, "");
   background_.RunAll();
   compute_.RunAll();
